@@ -1,0 +1,105 @@
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace pmeta {
+
+/// Closed or open interval that a number must lie in.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool low_open = false;
+  bool high_open = false;
+
+  static Range atLeast(double low) { return {low, std::numeric_limits<double>::infinity()}; }
+  static Range above(double low) {
+    return {low, std::numeric_limits<double>::infinity(), true, false};
+  }
+  static Range between(double low, double high) { return {low, high}; }
+  static Range halfOpen(double low, double high) { return {low, high, false, true}; }
+
+  bool contains(double value) const;
+  std::string text() const;  ///< "at least 0", "from 0 to 1", "any"; for error messages
+};
+
+/// The settings of a program: typed variables bound to dotted keys ("personal.lambda").
+///
+/// Each binding gives the key, the variable (which holds the default), its meaning and what is
+/// allowed; reading, overriding, printing and saving all follow from it. Whatever is not bound is
+/// an unknown key. Every failure throws Error with one sentence: the key, the value, what is
+/// allowed, and for an unknown key the nearest known one. Bound variables must outlive the object.
+class Settings {
+ public:
+  void bind(const std::string& key, double& value, const std::string& doc, Range range = {});
+  void bind(const std::string& key, int& value, const std::string& doc, Range range = {});
+  void bind(const std::string& key, std::int64_t& value, const std::string& doc, Range range = {});
+  void bind(const std::string& key, bool& value, const std::string& doc);
+  /// `choices`: the allowed words; empty means any text.
+  void bind(const std::string& key, std::string& value, const std::string& doc,
+            std::vector<std::string> choices = {});
+  /// Lists must not be empty; `range` holds for each element.
+  void bind(const std::string& key, std::vector<int>& value, const std::string& doc,
+            Range range = {});
+  void bind(const std::string& key, std::vector<double>& value, const std::string& doc,
+            Range range = {});
+  void bind(const std::string& key, std::vector<std::string>& value, const std::string& doc,
+            std::vector<std::string> choices = {});
+
+  /// Reads a map of (nested) settings; `source` names it in errors.
+  void read(const YAML::Node& root, const std::string& source);
+
+  /// Applies "key:=value"; the key may be shortened to its last part where that is unambiguous.
+  /// The value is YAML, e.g. "lambda:=5" or "sizes:=[4,5]".
+  void assign(const std::string& assignment);
+
+  /// The full key that `name` (full or shortened) stands for.
+  std::string resolve(const std::string& name, const std::string& source) const;
+
+  /// Every setting as YAML text, in binding order. Reading it again gives the same values.
+  std::string yaml() const;
+
+  /// An aligned table for people: key, value, "(default)" where unchanged; with meanings on
+  /// request.
+  std::string table(bool with_docs = false) const;
+
+ private:
+  struct Entry {
+    std::string key;
+    std::string doc;
+    std::string allowed;
+    std::string initial;  ///< the default, as text
+    std::function<void(const YAML::Node&, const std::string& where)> read;
+    std::function<std::string()> text;
+  };
+
+  void add(Entry entry);
+  void readMap(const YAML::Node& map, const std::string& prefix, const std::string& source);
+  const Entry* find(const std::string& key) const;
+  [[noreturn]] void refuseUnknown(const std::string& name, const std::string& where) const;
+
+  std::vector<Entry> entries_;
+};
+
+/// The shortest text that reads back as exactly this number.
+std::string formatNumber(double value);
+
+/// Loads a YAML file; throws Error if it is missing, unreadable, malformed or not a map.
+YAML::Node loadYamlFile(const std::string& path);
+
+/// Parses YAML text that must be a map; `source` names it in errors.
+YAML::Node parseYaml(const std::string& text, const std::string& source);
+
+/// The candidate closest to `word` by edit distance, or "" if none is close.
+std::string nearest(const std::string& word, const std::vector<std::string>& candidates);
+
+/// "a, b, c": words joined for messages and tables.
+std::string join(const std::vector<std::string>& words, const std::string& separator = ", ");
+
+}  // namespace pmeta

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/base/rng.h"
+#include "pmeta_core/base/settings.h"
+
+namespace pmeta {
+
+/// What an agent must know of an environment before it acts.
+struct EnvSpec {
+  std::string name;          ///< family name, e.g. "gridworld"
+  int observation_size = 0;  ///< length of an observation vector
+  int action_size = 0;       ///< length of an action vector; 1 where actions are discrete
+  int num_actions = 0;       ///< number of discrete actions; 0 where they are continuous
+  int horizon = 0;           ///< steps after which an episode is truncated
+};
+
+/// What one step gives besides the next observation.
+struct Step {
+  double reward = 0;
+  bool terminated = false;  ///< a terminal state: nothing to bootstrap from
+  bool truncated = false;   ///< the horizon was reached: the value of the state goes on
+};
+
+/// One MDP. All randomness comes in as an argument; the state is the only thing that is kept.
+class Env {
+ public:
+  virtual ~Env() = default;
+
+  virtual const EnvSpec& spec() const = 0;
+
+  /// Draws a start state and writes its observation (spec().observation_size numbers).
+  virtual void reset(Rng& rng, double* observation) = 0;
+
+  /// Acts once. A discrete action a is passed as action[0] == a.
+  virtual Step step(const double* action, Rng& rng, double* observation) = 0;
+};
+
+/// A family of MDPs, the tasks of one experiment: its settings, and the tasks that follow from
+/// them.
+class EnvFamily {
+ public:
+  virtual ~EnvFamily() = default;
+
+  /// Binds the family's settings below "environment.".
+  virtual void bind(Settings& settings) = 0;
+
+  /// Draws and checks the tasks; to be called once, after reading and before anything below.
+  virtual void build(std::uint64_t seed) = 0;
+
+  virtual int numTasks() const = 0;
+
+  /// A short name without blanks or commas, e.g. "grid_4x4".
+  virtual std::string taskName(int task) const = 0;
+
+  /// What sets the task apart, e.g. "4x4 cells, landmark at (3,3)"; for manifests and people.
+  virtual std::string taskDescription(int task) const = 0;
+
+  /// A new environment of that task. The family must outlive it.
+  virtual std::unique_ptr<Env> make(int task) const = 0;
+};
+
+/// The family of that name, with its default settings. Throws Error listing the known names.
+std::unique_ptr<EnvFamily> makeEnvFamily(const std::string& name);
+
+/// Names that makeEnvFamily knows.
+std::vector<std::string> envFamilyNames();
+
+}  // namespace pmeta

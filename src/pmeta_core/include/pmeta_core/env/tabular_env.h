@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "pmeta_core/env/env.h"
+
+namespace pmeta {
+
+/// One possible result of acting: p(s', r | s, a).
+struct Outcome {
+  int next_state = 0;
+  double probability = 1;
+  double reward = 0;
+  bool terminated = false;
+};
+
+/// A finite MDP with a known model, one task out of a family that shares one table of states.
+///
+/// State indices are rows of the family's table (the union of all tasks' states); a task owns the
+/// states in which it can act. Terminal states are not owned: they have no action values.
+class TabularEnv : public Env {
+ public:
+  virtual int numStates() const = 0;                        ///< rows of the shared table
+  virtual const std::vector<int>& ownedStates() const = 0;  ///< ascending
+  virtual const std::vector<Outcome>& outcomes(int state, int action) const = 0;
+  virtual int stateOf(const double* observation) const = 0;
+
+  int numActions() const { return spec().num_actions; }
+
+  /// Draws an outcome of (state, action); a certain outcome draws nothing.
+  const Outcome& sample(int state, int action, Rng& rng) const;
+};
+
+}  // namespace pmeta

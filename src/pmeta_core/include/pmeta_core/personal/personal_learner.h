@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "pmeta_core/base/model.h"
+#include "pmeta_core/base/rng.h"
+#include "pmeta_core/learn/tabular.h"
+#include "pmeta_core/personal/personal_settings.h"
+
+namespace pmeta {
+
+/// One evaluation episode, for people to look at. Never part of what training exchanges.
+struct Episode {
+  int observation_size = 0;
+  int action_size = 0;
+  std::vector<double> observations;  ///< (steps + 1) x observation_size, row-major
+  std::vector<double> actions;       ///< steps x action_size, row-major
+  std::vector<double> rewards;       ///< steps
+  bool terminated = false;
+  bool truncated = false;
+  std::vector<double> state_values;  ///< tabular tasks: max_a Q(s,a) by state, NaN where not owned
+  std::vector<std::int32_t> greedy_actions;  ///< tabular tasks: argmax_a Q(s,a), -1 where not owned
+};
+
+/// What one personalised update cost and gave.
+struct UpdateStats {
+  std::int64_t env_steps = 0;  ///< environment transitions
+  std::int64_t updates = 0;    ///< personalised updates
+  double loss = 0;             ///< the learner's own measure; for tables the mean |TD error|
+};
+
+/// A learner bound to one task with its personal parameters phi and auxiliary parameters omega.
+class PersonalLearner {
+ public:
+  virtual ~PersonalLearner() = default;
+
+  virtual const ModelLayout& layout() const = 0;
+
+  /// The parameters every party begins with; depends on `seed` only, the same for all tasks.
+  virtual Model initialModel(std::uint64_t seed) const = 0;
+
+  /// Takes the meta-policy: omega <- meta, and phi <- meta unless phi is kept.
+  virtual void beginRound(const Model& meta, bool keep_personal) = 0;
+
+  /// One of the R iterations: personalised update (K steps), then auxiliary update.
+  virtual UpdateStats update(Rng& rng) = 0;
+
+  /// Parameters with this task's presence mask.
+  virtual const Model& personal() const = 0;
+  virtual const Model& auxiliary() const = 0;
+
+  /// Return of `policy` on this task, greedy, by the protocol of the environment.
+  virtual ReturnStats evaluate(const Model& policy, Rng& rng) const = 0;
+
+  /// One greedy episode of `policy` from a start drawn by `rng`.
+  virtual Episode record(const Model& policy, Rng& rng) const = 0;
+};
+
+}  // namespace pmeta

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+namespace pmeta {
+
+/// Step sizes of the personalised and auxiliary updates (paper, eqs. per_update0 and
+/// local_update0).
+struct PersonalSettings {
+  double alpha = 0.08;  ///< personalised learning rate
+  double lambda = 10;   ///< strength of the pull towards the auxiliary parameters
+  double eta = 0.08;    ///< auxiliary learning rate
+  std::string personal_init =
+      "meta";  ///< at a round's start: "meta" (the paper's line 7) or "keep"
+};
+
+}  // namespace pmeta

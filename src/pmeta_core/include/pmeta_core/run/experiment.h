@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/base/model.h"
+#include "pmeta_core/base/settings.h"
+#include "pmeta_core/env/env.h"
+#include "pmeta_core/personal/personal_learner.h"
+#include "pmeta_core/personal/tabular_personal_learner.h"
+
+namespace pmeta {
+
+/// How the meta-aggregator mixes and how long it waits.
+struct AggregationSettings {
+  double beta = 1;            ///< mixing: meta <- (1 - beta) meta + beta mean
+  int quorum = 0;             ///< updates that suffice once round_timeout has passed; 0 means all
+  double round_timeout = 30;  ///< seconds before a round counts as late
+};
+
+/// Everything that defines a run, with defaults.
+struct ExperimentSettings {
+  std::string experiment = "experiment";
+  std::string algorithm = "pmeta";  ///< pmeta, model_averaging or independent
+  std::int64_t seed = 0;
+  int rounds = 10;            ///< C
+  int updates_per_round = 3;  ///< R
+  std::string results_dir;    ///< "" means $ROS_HOME/pmeta, by default ~/.ros/pmeta
+  std::string run_id;         ///< "" means one made of the start time, algorithm and seed
+  double pace = 0;            ///< least seconds between rounds, to watch a fast experiment
+  bool publish_trajectories = true;
+  PersonalSettings personal;
+  QLearningSettings q_learning;
+  AggregationSettings aggregation;
+  std::string environment = "gridworld";
+};
+
+/// A checked experiment: its settings, its tasks, and what each party needs of them.
+///
+/// The three algorithms are settings, not code paths of their own:
+///   pmeta            personal pull lambda, agents send auxiliary parameters
+///   model_averaging  lambda = 0, agents send their personal parameters
+///   independent      lambda = 0, personal parameters kept, beta = 0: nothing comes back
+class Experiment {
+ public:
+  /// Reads a settings file and applies "key:=value" overrides. Throws Error.
+  static Experiment load(const std::string& path, const std::vector<std::string>& overrides = {});
+
+  /// The same from YAML text; `source` names it in errors.
+  static Experiment parse(const std::string& text, const std::string& source,
+                          const std::vector<std::string>& overrides = {});
+
+  const ExperimentSettings& settings() const { return settings_; }
+  const EnvFamily& family() const { return *family_; }
+  int numTasks() const { return family_->numTasks(); }
+
+  bool sendsPersonal() const { return settings_.algorithm != "pmeta"; }
+  bool evaluatesMeta() const { return settings_.algorithm != "independent"; }
+  bool keepsPersonal() const { return settings_.personal.personal_init == "keep"; }
+  int quorum() const;  ///< updates needed once the deadline has passed
+
+  std::unique_ptr<PersonalLearner> makeLearner(int task) const;
+
+  /// <results_dir>/<experiment>/<run_id>
+  std::string runDir() const;
+
+  /// The effective settings as YAML; parse() of it gives the same experiment.
+  const std::string& yaml() const { return yaml_; }
+  /// The same as a table for people.
+  const std::string& table() const { return table_; }
+  /// All keys with meanings, for --help.
+  static std::string describe(const std::string& environment);
+  /// Notes and warnings about the settings, one sentence each.
+  const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  Experiment() = default;
+  static Experiment build(const YAML::Node& root, const std::string& source,
+                          const std::vector<std::string>& overrides);
+  void bind(Settings& settings);
+  void applyAlgorithm();
+  void checkStability();
+
+  ExperimentSettings settings_;
+  std::shared_ptr<EnvFamily> family_;
+  std::string yaml_;
+  std::string table_;
+  std::vector<std::string> notes_;
+};
+
+/// "~" and "" expanded: where results go by default, see ExperimentSettings::results_dir.
+std::string expandResultsDir(const std::string& results_dir);
+
+/// Creates `dir` if need be and proves that a file can be written there; throws Error.
+void requireWritable(const std::string& dir);
+
+/// UTC time as 20261122T061203, for names; or 2026-11-22T06:12:03Z, for people.
+std::string utcStamp();
+std::string utcTime();
+
+}  // namespace pmeta

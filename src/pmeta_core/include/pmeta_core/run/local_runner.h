@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/run/meta_aggregator.h"
+#include "pmeta_core/run/run_log.h"
+#include "pmeta_core/run/task_agent.h"
+
+namespace pmeta {
+
+/// What a run in one process gives.
+struct LocalResult {
+  bool stopped = false;  ///< before the last round
+  std::vector<RoundBook::Round> rounds;
+  Model meta;  ///< the last meta-policy
+};
+
+/// Called after each round; false stops the run.
+using OnRound = std::function<bool(const RoundSummary&)>;
+
+/// Runs the whole experiment in this process and thread, with the very classes the nodes use and
+/// the same result bit for bit. Files are written if `log` is given.
+LocalResult runLocally(const Experiment& experiment, RunLog* log = nullptr,
+                       const OnRound& on_round = {});
+
+}  // namespace pmeta

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/run/protocol.h"
+
+namespace pmeta {
+
+/// The aggregator's side of the algorithm: collects one update a task and mixes them. Knows no ROS.
+class MetaAggregator {
+ public:
+  enum class Verdict {
+    kAccepted,
+    kDuplicate,  ///< this task has already reported in this round
+    kStale,      ///< of a round that is over
+    kRefused,    ///< does not belong here; Answer::reason says why
+  };
+  struct Answer {
+    Verdict verdict = Verdict::kAccepted;
+    std::string reason;
+  };
+  /// How often each verdict was given to a task.
+  struct Counts {
+    std::int64_t accepted = 0;
+    std::int64_t duplicate = 0;
+    std::int64_t stale = 0;
+    std::int64_t refused = 0;
+  };
+
+  explicit MetaAggregator(const Experiment& experiment);
+
+  /// Checks an update and keeps it for this round. The update is shared, not copied.
+  Answer offer(std::shared_ptr<const AuxiliaryUpdate> update);
+
+  /// The meta-policy after the rounds closed so far.
+  const MetaPolicy& metaPolicy() const { return meta_; }
+
+  std::vector<int> reported() const;  ///< tasks in, ascending
+  std::vector<int> missing() const;   ///< tasks still out, ascending
+  bool complete() const { return missing().empty(); }
+  bool hasQuorum() const { return static_cast<int>(reported().size()) >= quorum_; }
+
+  /// Mixes what has been reported, in task order, and begins the next round.
+  /// Returns the tasks that were missing. Needs at least one update.
+  std::vector<int> closeRound();
+
+  const std::vector<Counts>& counts() const { return counts_; }     ///< by task
+  std::int64_t refusedUnknown() const { return refused_unknown_; }  ///< from tasks not of this run
+
+ private:
+  std::string refusal(const AuxiliaryUpdate& update) const;
+
+  double beta_;
+  int quorum_;
+  MetaPolicy meta_;
+  std::vector<std::shared_ptr<const AuxiliaryUpdate>> updates_;  ///< by task; null: missing
+  std::vector<Counts> counts_;
+  std::int64_t refused_unknown_ = 0;
+};
+
+}  // namespace pmeta

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/base/model.h"
+
+namespace pmeta {
+
+/// What the aggregator publishes: the meta-policy after `round` aggregations (0: the initial one).
+struct MetaPolicy {
+  std::string run_id;
+  int round = 0;
+  Model model;
+  std::vector<int> participants;  ///< tasks in this aggregation, ascending; empty for round 0
+};
+
+/// What an agent sends at the end of its round: auxiliary (or, when averaging, personal)
+/// parameters.
+struct AuxiliaryUpdate {
+  std::string run_id;
+  int task = 0;
+  int round = 0;  ///< the round that was trained: one more than the meta-policy it began with
+  Model model;
+  double weight = 1;
+};
+
+enum class Policy { kPersonal, kMeta };
+enum class Split { kTrain, kTest };
+
+const char* name(Policy policy);  ///< "personal", "meta"
+const char* name(Split split);    ///< "train", "test"
+
+/// Result of one evaluation of one policy on one task.
+struct TaskReturn {
+  std::string run_id;
+  int task = 0;
+  int round = 0;
+  Split split = Split::kTrain;
+  Policy policy = Policy::kPersonal;
+  double mean = 0;  ///< mean undiscounted return
+  double std = 0;   ///< over episodes
+  int episodes = 0;
+  std::int64_t env_steps = 0;  ///< training transitions of this round; 0 for the meta-policy
+  std::int64_t updates = 0;    ///< personalised updates of this round; 0 for the meta-policy
+  double seconds = 0;          ///< wall time of this round's training and evaluation
+};
+
+/// One round as the aggregator saw it.
+struct RoundSummary {
+  std::string run_id;
+  int round = 0;
+  int rounds = 0;
+  double personal_return = 0;  ///< PP: mean over reported tasks; NaN if none
+  double meta_return = 0;      ///< MP: the same; NaN if none
+  std::vector<int> participants;
+  std::vector<int> missing;  ///< tasks whose update this round did without
+  double seconds = 0;        ///< from the meta-policy's publication to the aggregation
+  double eta_seconds = 0;    ///< estimate until the last round
+};
+
+}  // namespace pmeta

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <chrono>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/run/protocol.h"
+
+namespace pmeta {
+
+/// One line of rounds.csv: a return with the counters summed over the rounds so far.
+struct RoundRow {
+  TaskReturn result;
+  std::int64_t env_steps = 0;  ///< cumulative, of the task
+  std::int64_t updates = 0;    ///< cumulative, of the task
+};
+
+/// Collects returns as they arrive, in any order, and gives out complete rounds in a fixed one:
+/// personal returns by task, then meta returns by task. That makes a run's record independent of
+/// arrival order.
+class RoundBook {
+ public:
+  struct Round {
+    RoundSummary summary;
+    std::vector<RoundRow> rows;
+  };
+
+  explicit RoundBook(const Experiment& experiment);
+
+  /// False if the return is a duplicate, of a round given out already, or of no task of this run.
+  bool add(const TaskReturn& result);
+
+  /// Round `round` has been aggregated: personal returns of its participants and meta returns of
+  /// all tasks are due.
+  void closeRound(int round, const std::vector<int>& participants, const std::vector<int>& missing,
+                  double seconds);
+
+  /// Rounds that are complete, in order. With `force`, closed rounds come out as they are.
+  std::vector<Round> take(bool force = false);
+
+  int roundsTaken() const { return next_ - 1; }
+  /// Tasks whose returns the oldest open round still waits for.
+  std::vector<int> awaited() const;
+
+ private:
+  struct Open {
+    bool closed = false;
+    RoundSummary summary;
+    std::map<std::pair<int, int>, TaskReturn> results;  ///< by (policy, task)
+  };
+  bool isComplete(const Open& open) const;
+
+  int num_tasks_;
+  int rounds_;
+  bool expects_meta_;
+  std::string run_id_;
+  std::map<int, Open> open_;
+  int next_ = 1;
+  std::vector<std::int64_t> env_steps_;
+  std::vector<std::int64_t> updates_;
+  double seconds_ = 0;
+};
+
+/// The files of a run: config.yaml, manifest.json and rounds.csv in
+/// <results_dir>/<experiment>/<run_id>.
+class RunLog {
+ public:
+  /// Creates the folder; throws Error if it holds a run already or cannot be written.
+  explicit RunLog(const Experiment& experiment);
+
+  /// Appends the round's rows and flushes them to disk.
+  void write(const RoundBook::Round& round);
+
+  /// Sets the manifest's status: "finished", "stopped" or "failed".
+  void finish(const std::string& status);
+
+  const std::string& dir() const { return dir_; }
+
+  static const char* csvHeader();
+  static std::string csvLine(const RoundRow& row);
+
+ private:
+  void writeManifest(const std::string& status);
+
+  const Experiment& experiment_;
+  std::string dir_;
+  std::string started_;
+  int rounds_done_ = 0;
+  std::ofstream csv_;
+};
+
+/// Status in a run folder's manifest.json: "running", "finished", "stopped", "failed", or "" if
+/// none.
+std::string runStatus(const std::string& run_dir);
+
+/// Writes a whole file under a temporary name, then renames it: never half a file. Throws Error.
+void writeFileAtomically(const std::string& path, const std::string& text);
+
+}  // namespace pmeta

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/run/protocol.h"
+
+namespace pmeta {
+
+/// One task's side of the algorithm: trains its personalised policy round by round. Knows no ROS.
+class TaskAgent {
+ public:
+  /// What one round of training gives.
+  struct RoundResult {
+    AuxiliaryUpdate update;
+    TaskReturn personal;
+    double loss = 0;      ///< of the last update
+    double distance = 0;  ///< ||phi - omega_meta|| over the task's own entries
+  };
+
+  /// Called after each update with the number done in this round; false stops training.
+  using KeepGoing = std::function<bool(int updates_done)>;
+
+  TaskAgent(const Experiment& experiment, int task);
+
+  int task() const { return task_; }
+  const ModelLayout& layout() const { return learner_->layout(); }
+
+  /// One round from `meta`: reset, R updates, evaluation of the personal policy. Nothing if
+  /// stopped. Throws Error if the meta-policy does not fit.
+  std::optional<RoundResult> trainRound(const MetaPolicy& meta, const KeepGoing& keep_going = {});
+
+  /// The meta-policy on this task.
+  TaskReturn evaluateMeta(const MetaPolicy& meta) const;
+
+  /// One greedy episode, from the same start whatever the policy and round.
+  Episode recordPersonal() const;
+  Episode recordMeta(const MetaPolicy& meta) const;
+
+ private:
+  Rng evaluationRng() const;
+  TaskReturn evaluate(const Model& policy) const;
+
+  std::string run_id_;
+  std::uint64_t seed_;
+  int task_;
+  int updates_per_round_;
+  bool keeps_personal_;
+  bool sends_personal_;
+  std::unique_ptr<PersonalLearner> learner_;
+};
+
+}  // namespace pmeta

@@ -1,0 +1,425 @@
+#include "pmeta_core/base/settings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "pmeta_core/base/error.h"
+
+namespace pmeta {
+namespace {
+
+std::size_t editDistance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t substitute = diagonal + (a[i - 1] != b[j - 1]);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substitute});
+    }
+  }
+  return row.back();
+}
+
+std::string lastPart(const std::string& key) {
+  const auto dot = key.rfind('.');
+  return dot == std::string::npos ? key : key.substr(dot + 1);
+}
+
+std::string where(const std::string& source, const YAML::Node& node) {
+  const int line = node.Mark().line;
+  return line < 0 ? source : source + " line " + std::to_string(line + 1);
+}
+
+std::string shown(const YAML::Node& node) {
+  if (node.IsScalar()) return node.Scalar();
+  std::string text = YAML::Dump(node);
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text.empty() ? "null" : text;
+}
+
+// strtod over the whole scalar: yaml-cpp's own conversion also takes words such as ".nan"
+bool parseNumber(const YAML::Node& node, double& value) {
+  if (!node.IsScalar() || node.Scalar().empty()) return false;
+  const std::string& text = node.Scalar();
+  char* end = nullptr;
+  value = std::strtod(text.c_str(), &end);
+  return end == text.c_str() + text.size() && std::isfinite(value) &&
+         text.find_first_of("xXpPnN ") == std::string::npos;
+}
+
+bool parseInteger(const YAML::Node& node, std::int64_t& value) {
+  double number = 0;
+  if (!parseNumber(node, number)) return false;
+  const std::string& text = node.Scalar();
+  errno = 0;
+  char* end = nullptr;
+  value = std::strtoll(text.c_str(), &end, 10);
+  if (end == text.c_str() + text.size()) return errno == 0;
+  // 1e5 and 3.0 are whole numbers too
+  if (number != std::floor(number) || std::abs(number) > 9e15) return false;
+  value = static_cast<std::int64_t>(number);
+  return true;
+}
+
+[[noreturn]] void refuse(const std::string& key, const YAML::Node& node, const std::string& source,
+                         const std::string& allowed) {
+  throw Error(key + " is '" + shown(node) + "' (" + where(source, node) + ") but must be " +
+              allowed + ".");
+}
+
+std::string quoted(const std::string& text) {
+  YAML::Emitter out;
+  out << text;
+  // words that YAML would read as something else
+  static const std::set<std::string> kReserved = {"",    "~",  "null", "true", "false",
+                                                  "yes", "no", "on",   "off"};
+  double number = 0;
+  if (kReserved.count(text) != 0 || parseNumber(YAML::Node(text), number))
+    return "\"" + text + "\"";
+  return out.c_str();
+}
+
+std::string rangeSuffix(const Range& range) {
+  const std::string text = range.text();
+  return text == "any" ? "" : ", " + text;
+}
+
+bool contains(const std::vector<std::string>& words, const std::string& word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+template <class T>
+std::string listText(const std::vector<T>& values,
+                     const std::function<std::string(const T&)>& one) {
+  std::vector<std::string> words;
+  for (const T& value : values) words.push_back(one(value));
+  return "[" + join(words) + "]";
+}
+
+// reads a list (or a single value as a list of one), each element by `parse`
+template <class T>
+std::vector<T> readList(const std::string& key, const YAML::Node& node, const std::string& source,
+                        const std::string& allowed,
+                        const std::function<bool(const YAML::Node&, T&)>& parse) {
+  std::vector<T> values;
+  const auto take = [&](const YAML::Node& element) {
+    T value{};
+    if (!parse(element, value)) refuse(key, node, source, allowed);
+    values.push_back(value);
+  };
+  if (node.IsSequence()) {
+    for (const auto& element : node) take(element);
+  } else {
+    take(node);
+  }
+  if (values.empty()) refuse(key, node, source, allowed);
+  return values;
+}
+
+}  // namespace
+
+bool Range::contains(double value) const {
+  return (low_open ? value > low : value >= low) && (high_open ? value < high : value <= high);
+}
+
+std::string Range::text() const {
+  const bool has_low = std::isfinite(low);
+  const bool has_high = std::isfinite(high);
+  if (!has_low && !has_high) return "any";
+  if (!has_high) return (low_open ? "above " : "at least ") + formatNumber(low);
+  if (!has_low) return (high_open ? "below " : "at most ") + formatNumber(high);
+  return std::string(low_open ? "above " : "from ") + formatNumber(low) +
+         (high_open ? " to below " : " to ") + formatNumber(high);
+}
+
+void Settings::add(Entry entry) {
+  if (find(entry.key) != nullptr) throw std::logic_error("setting bound twice: " + entry.key);
+  entry.initial = entry.text();
+  entries_.push_back(std::move(entry));
+}
+
+void Settings::bind(const std::string& key, double& value, const std::string& doc, Range range) {
+  const std::string allowed = "a number" + rangeSuffix(range);
+  add({key, doc, allowed, "",
+       [=, &value](const YAML::Node& node, const std::string& source) {
+         double number = 0;
+         if (!parseNumber(node, number) || !range.contains(number)) {
+           refuse(key, node, source, allowed);
+         }
+         value = number;
+       },
+       [&value] { return formatNumber(value); }});
+}
+
+void Settings::bind(const std::string& key, std::int64_t& value, const std::string& doc,
+                    Range range) {
+  const std::string allowed = "a whole number" + rangeSuffix(range);
+  add({key, doc, allowed, "",
+       [=, &value](const YAML::Node& node, const std::string& source) {
+         std::int64_t number = 0;
+         if (!parseInteger(node, number) || !range.contains(static_cast<double>(number))) {
+           refuse(key, node, source, allowed);
+         }
+         value = number;
+       },
+       [&value] { return std::to_string(value); }});
+}
+
+void Settings::bind(const std::string& key, int& value, const std::string& doc, Range range) {
+  range.low = std::max(range.low, static_cast<double>(std::numeric_limits<int>::min()));
+  const std::string allowed = "a whole number" + rangeSuffix(range);
+  add({key, doc, allowed, "",
+       [=, &value](const YAML::Node& node, const std::string& source) {
+         std::int64_t number = 0;
+         if (!parseInteger(node, number) || !range.contains(static_cast<double>(number)) ||
+             number > std::numeric_limits<int>::max()) {
+           refuse(key, node, source, allowed);
+         }
+         value = static_cast<int>(number);
+       },
+       [&value] { return std::to_string(value); }});
+}
+
+void Settings::bind(const std::string& key, bool& value, const std::string& doc) {
+  const std::string allowed = "true or false";
+  add({key, doc, allowed, "",
+       [=, &value](const YAML::Node& node, const std::string& source) {
+         if (!node.IsScalar() || (node.Scalar() != "true" && node.Scalar() != "false")) {
+           refuse(key, node, source, allowed);
+         }
+         value = node.Scalar() == "true";
+       },
+       [&value] { return std::string(value ? "true" : "false"); }});
+}
+
+void Settings::bind(const std::string& key, std::string& value, const std::string& doc,
+                    std::vector<std::string> choices) {
+  const std::string allowed = choices.empty() ? "text" : "one of " + join(choices);
+  add({key, doc, allowed, "",
+       [=, &value](const YAML::Node& node, const std::string& source) {
+         if (!node.IsScalar() || (!choices.empty() && !contains(choices, node.Scalar()))) {
+           refuse(key, node, source, allowed);
+         }
+         value = node.Scalar();
+       },
+       [&value] { return quoted(value); }});
+}
+
+void Settings::bind(const std::string& key, std::vector<int>& value, const std::string& doc,
+                    Range range) {
+  const std::string allowed = "a list of whole numbers" + rangeSuffix(range);
+  add({key, doc, allowed, "",
+       [=, &value](const YAML::Node& node, const std::string& source) {
+         value = readList<int>(key, node, source, allowed, [&](const YAML::Node& one, int& out) {
+           std::int64_t number = 0;
+           if (!parseInteger(one, number) || !range.contains(static_cast<double>(number)) ||
+               std::abs(number) > std::numeric_limits<int>::max()) {
+             return false;
+           }
+           out = static_cast<int>(number);
+           return true;
+         });
+       },
+       [&value] {
+         return listText<int>(value, [](const int& one) { return std::to_string(one); });
+       }});
+}
+
+void Settings::bind(const std::string& key, std::vector<double>& value, const std::string& doc,
+                    Range range) {
+  const std::string allowed = "a list of numbers" + rangeSuffix(range);
+  add({key, doc, allowed, "",
+       [=, &value](const YAML::Node& node, const std::string& source) {
+         value =
+             readList<double>(key, node, source, allowed, [&](const YAML::Node& one, double& out) {
+               return parseNumber(one, out) && range.contains(out);
+             });
+       },
+       [&value] { return listText<double>(value, formatNumber); }});
+}
+
+void Settings::bind(const std::string& key, std::vector<std::string>& value, const std::string& doc,
+                    std::vector<std::string> choices) {
+  const std::string allowed =
+      choices.empty() ? "a list of words" : "a list of words out of " + join(choices);
+  add({key, doc, allowed, "",
+       [=, &value](const YAML::Node& node, const std::string& source) {
+         value = readList<std::string>(key, node, source, allowed,
+                                       [&](const YAML::Node& one, std::string& out) {
+                                         if (!one.IsScalar()) return false;
+                                         out = one.Scalar();
+                                         return choices.empty() || contains(choices, out);
+                                       });
+       },
+       [&value] { return listText<std::string>(value, quoted); }});
+}
+
+void Settings::read(const YAML::Node& root, const std::string& source) {
+  if (!root.IsMap()) throw Error(source + " must hold settings as 'key: value' lines.");
+  readMap(root, "", source);
+}
+
+void Settings::readMap(const YAML::Node& map, const std::string& prefix,
+                       const std::string& source) {
+  std::set<std::string> seen;
+  for (const auto& item : map) {
+    const std::string name = shown(item.first);
+    const std::string key = prefix + name;
+    if (!seen.insert(name).second) {
+      throw Error("setting '" + key + "' stands twice (" + where(source, item.first) +
+                  "): keep one of them.");
+    }
+    if (const Entry* entry = find(key)) {
+      entry->read(item.second, source);
+      continue;
+    }
+    const bool is_section = std::any_of(entries_.begin(), entries_.end(), [&](const Entry& entry) {
+      return entry.key.rfind(key + ".", 0) == 0;
+    });
+    if (!is_section) refuseUnknown(key, where(source, item.first));
+    if (!item.second.IsMap()) {
+      throw Error("'" + key + "' is a group of settings (" + where(source, item.first) +
+                  "): write its keys below it, indented.");
+    }
+    readMap(item.second, key + ".", source);
+  }
+}
+
+void Settings::assign(const std::string& assignment) {
+  const auto split = assignment.find(":=");
+  if (split == std::string::npos || split == 0) {
+    throw Error("'" + assignment + "' is not an assignment: write key:=value.");
+  }
+  const std::string source = "given as " + assignment;
+  const std::string key = resolve(assignment.substr(0, split), source);
+  YAML::Node value;
+  try {
+    value = YAML::Load(assignment.substr(split + 2));
+  } catch (const YAML::Exception& error) {
+    throw Error("the value of " + assignment + " is not valid YAML: " + error.msg + ".");
+  }
+  find(key)->read(value.IsNull() ? YAML::Node("") : value, source);
+}
+
+std::string Settings::resolve(const std::string& name, const std::string& source) const {
+  if (find(name) != nullptr) return name;
+  std::vector<std::string> matches;
+  for (const Entry& entry : entries_) {
+    if (lastPart(entry.key) == name) matches.push_back(entry.key);
+  }
+  if (matches.empty()) refuseUnknown(name, source);
+  if (matches.size() > 1) {
+    throw Error("setting '" + name + "' is ambiguous: write one of " + join(matches) + ".");
+  }
+  return matches.front();
+}
+
+std::string Settings::yaml() const {
+  std::ostringstream out;
+  std::string section;
+  for (const Entry& entry : entries_) {
+    const auto dot = entry.key.find('.');
+    const std::string group = dot == std::string::npos ? "" : entry.key.substr(0, dot);
+    if (group != section && !group.empty()) out << group << ":\n";
+    section = group;
+    out << (group.empty() ? "" : "  ") << (group.empty() ? entry.key : entry.key.substr(dot + 1))
+        << ": " << entry.text() << "\n";
+  }
+  return out.str();
+}
+
+std::string Settings::table(bool with_docs) const {
+  std::size_t key_width = 0;
+  for (const Entry& entry : entries_) key_width = std::max(key_width, entry.key.size());
+  std::ostringstream out;
+  for (const Entry& entry : entries_) {
+    const std::string text = entry.text();
+    out << "  " << entry.key << std::string(key_width - entry.key.size() + 2, ' ') << text
+        << (text == entry.initial ? "  (default)" : "") << "\n";
+    if (with_docs) {
+      out << "  " << std::string(key_width + 2, ' ') << entry.doc << " [" << entry.allowed << "]\n";
+    }
+  }
+  return out.str();
+}
+
+const Settings::Entry* Settings::find(const std::string& key) const {
+  for (const Entry& entry : entries_) {
+    if (entry.key == key) return &entry;
+  }
+  return nullptr;
+}
+
+void Settings::refuseUnknown(const std::string& name, const std::string& where) const {
+  std::vector<std::string> keys;
+  for (const Entry& entry : entries_) keys.push_back(entry.key);
+  std::string best = nearest(name, keys);
+  if (best.empty()) {
+    // a right name in the wrong group, or a misspelt short name
+    std::vector<std::string> short_names;
+    for (const std::string& key : keys) short_names.push_back(lastPart(key));
+    const std::string short_best = nearest(lastPart(name), short_names);
+    for (std::size_t i = 0; i < keys.size() && !short_best.empty(); ++i) {
+      if (short_names[i] == short_best) best = keys[i];
+    }
+  }
+  throw Error(
+      "unknown setting '" + name + "' (" + where + ")" +
+      (best.empty() ? "; known are " + join(keys) + "." : ": did you mean '" + best + "'?"));
+}
+
+std::string formatNumber(double value) {
+  char text[40];
+  for (int digits = 6; digits <= 17; ++digits) {
+    std::snprintf(text, sizeof text, "%.*g", digits, value);
+    if (std::strtod(text, nullptr) == value) break;
+  }
+  return text;
+}
+
+YAML::Node parseYaml(const std::string& text, const std::string& source) {
+  YAML::Node root;
+  try {
+    root = YAML::Load(text);
+  } catch (const YAML::Exception& error) {
+    throw Error(source + " line " + std::to_string(error.mark.line + 1) +
+                " is not valid YAML: " + error.msg + ".");
+  }
+  if (!root.IsMap()) throw Error(source + " must hold settings as 'key: value' lines.");
+  return root;
+}
+
+YAML::Node loadYamlFile(const std::string& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) throw Error("cannot read the settings file " + path + ".");
+  return parseYaml(text.str(), path);
+}
+
+std::string nearest(const std::string& word, const std::vector<std::string>& candidates) {
+  std::string best;
+  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 4) + 1;
+  for (const std::string& candidate : candidates) {
+    const std::size_t distance = editDistance(word, candidate);
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+std::string join(const std::vector<std::string>& words, const std::string& separator) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
+  return text;
+}
+
+}  // namespace pmeta

@@ -1,0 +1,26 @@
+#include "pmeta_core/base/version.h"
+
+#include <mujoco/mujoco.h>
+#include <zlib.h>
+
+#include <Eigen/Core>
+#include <nlohmann/json.hpp>
+
+namespace pmeta {
+
+std::map<std::string, std::string> versions() {
+  const auto dotted = [](int a, int b, int c) {
+    return std::to_string(a) + "." + std::to_string(b) + "." + std::to_string(c);
+  };
+  return {
+      {"pmeta", PMETA_VERSION},
+      {"compiler", __VERSION__},
+      {"eigen", dotted(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+      {"mujoco", mj_versionString()},
+      {"nlohmann_json", dotted(NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR,
+                               NLOHMANN_JSON_VERSION_PATCH)},
+      {"zlib", zlibVersion()},
+  };
+}
+
+}  // namespace pmeta

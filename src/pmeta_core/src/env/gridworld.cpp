@@ -1,0 +1,131 @@
+#include "pmeta_core/env/gridworld.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "pmeta_core/base/error.h"
+
+namespace pmeta {
+namespace {
+
+constexpr int kNumMoves = 4;
+constexpr int kRowStep[kNumMoves] = {-1, 1, 0, 0};  // up, down, left, right
+constexpr int kColumnStep[kNumMoves] = {0, 0, -1, 1};
+constexpr int kHorizonPerSide = 4;
+
+}  // namespace
+
+Gridworld::Gridworld(const GridworldTask& task, int stride) : task_(task), stride_(stride) {
+  spec_ = {"gridworld", 2, 1, kNumMoves, kHorizonPerSide * task.size};
+  outcomes_.resize(static_cast<std::size_t>(numStates()) * kNumMoves);
+  for (int row = 0; row < task.size; ++row) {
+    for (int column = 0; column < task.size; ++column) {
+      if (row == task.landmark_row && column == task.landmark_column) continue;
+      const int state = row * stride + column;
+      owned_states_.push_back(state);
+
+      Outcome moved[kNumMoves];
+      for (int move = 0; move < kNumMoves; ++move) {
+        const int r = std::clamp(row + kRowStep[move], 0, task.size - 1);
+        const int c = std::clamp(column + kColumnStep[move], 0, task.size - 1);
+        const int distance = std::abs(r - task.landmark_row) + std::abs(c - task.landmark_column);
+        moved[move] = {r * stride + c, 1.0, static_cast<double>(-distance), distance == 0};
+      }
+      for (int action = 0; action < kNumMoves; ++action) {
+        std::vector<Outcome>& list = outcomes_[state * kNumMoves + action];
+        if (task.slip == 0) {
+          list = {moved[action]};
+          continue;
+        }
+        for (int move = 0; move < kNumMoves; ++move) {
+          Outcome outcome = moved[move];
+          outcome.probability = task.slip / kNumMoves + (move == action ? 1 - task.slip : 0);
+          list.push_back(outcome);
+        }
+      }
+    }
+  }
+}
+
+void Gridworld::reset(Rng& rng, double* observation) {
+  state_ = owned_states_[rng.below(owned_states_.size())];
+  steps_ = 0;
+  observe(observation);
+}
+
+Step Gridworld::step(const double* action, Rng& rng, double* observation) {
+  const Outcome& outcome = sample(state_, static_cast<int>(action[0]), rng);
+  state_ = outcome.next_state;
+  ++steps_;
+  observe(observation);
+  return {outcome.reward, outcome.terminated, !outcome.terminated && steps_ >= spec_.horizon};
+}
+
+const std::vector<Outcome>& Gridworld::outcomes(int state, int action) const {
+  return outcomes_[static_cast<std::size_t>(state) * kNumMoves + action];
+}
+
+int Gridworld::stateOf(const double* observation) const {
+  return static_cast<int>(observation[0]) * stride_ + static_cast<int>(observation[1]);
+}
+
+void Gridworld::observe(double* observation) const {
+  observation[0] = state_ / stride_;
+  observation[1] = state_ % stride_;
+}
+
+void GridworldFamily::bind(Settings& settings) {
+  settings.bind("environment.sizes", sizes_, "cells along each side, one task each",
+                Range::between(2, 512));
+  settings.bind("environment.landmark", landmark_,
+                "where the landmark lies: corner (tasks agree), centre or random (tasks conflict)",
+                {"corner", "centre", "random"});
+  settings.bind("environment.slip", slip_,
+                "probability of a random move; one number, or one for each task",
+                Range::halfOpen(0, 1));
+}
+
+void GridworldFamily::build(std::uint64_t seed) {
+  if (slip_.size() != 1 && slip_.size() != sizes_.size()) {
+    throw Error("environment.slip has " + std::to_string(slip_.size()) + " values for " +
+                std::to_string(sizes_.size()) + " tasks: give one, or one for each task.");
+  }
+  tasks_.clear();
+  stride_ = *std::max_element(sizes_.begin(), sizes_.end());
+  for (std::size_t i = 0; i < sizes_.size(); ++i) {
+    GridworldTask task;
+    task.size = sizes_[i];
+    task.slip = slip_[slip_.size() == 1 ? 0 : i];
+    if (landmark_ == "corner") {
+      task.landmark_row = task.landmark_column = task.size - 1;
+    } else if (landmark_ == "centre") {
+      task.landmark_row = task.landmark_column = task.size / 2;
+    } else {
+      Rng rng(seed, i, Stream::kTaskDraw);
+      task.landmark_row = static_cast<int>(rng.below(task.size));
+      task.landmark_column = static_cast<int>(rng.below(task.size));
+    }
+    tasks_.push_back(task);
+  }
+}
+
+std::string GridworldFamily::taskName(int task) const {
+  const std::string side = std::to_string(tasks_.at(task).size);
+  return "grid_" + side + "x" + side;
+}
+
+std::string GridworldFamily::taskDescription(int task) const {
+  const GridworldTask& t = tasks_.at(task);
+  std::string text = std::to_string(t.size) + "x" + std::to_string(t.size) +
+                     " cells, landmark at row " + std::to_string(t.landmark_row) + ", column " +
+                     std::to_string(t.landmark_column);
+  if (t.slip > 0) text += ", slip " + formatNumber(t.slip);
+  return text;
+}
+
+std::unique_ptr<Env> GridworldFamily::make(int task) const {
+  return std::make_unique<Gridworld>(tasks_.at(task), stride_);
+}
+
+}  // namespace pmeta

@@ -1,0 +1,240 @@
+#include "pmeta_core/run/experiment.h"
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+
+#include "pmeta_core/base/error.h"
+
+namespace pmeta {
+namespace {
+
+std::string formatUtc(const char* format) {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  char text[40];
+  std::strftime(text, sizeof text, format, &parts);
+  return text;
+}
+
+std::string environmentVariable(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+// the family's own settings are known only once its name is
+std::string environmentName(const YAML::Node& root, const std::vector<std::string>& overrides) {
+  std::string name = ExperimentSettings().environment;
+  if (root["environment"] && root["environment"].IsMap() && root["environment"]["name"] &&
+      root["environment"]["name"].IsScalar()) {
+    name = root["environment"]["name"].Scalar();
+  }
+  const std::string prefix = "environment.name:=";
+  for (const std::string& assignment : overrides) {
+    if (assignment.rfind(prefix, 0) == 0) name = assignment.substr(prefix.size());
+  }
+  return name;
+}
+
+void checkName(const std::string& key, const std::string& value) {
+  if (value.find_first_of("/ \t\n\\\"'") != std::string::npos || value == "." || value == "..") {
+    throw Error(key + " is '" + value + "' but must be a plain name, without blanks or slashes.");
+  }
+}
+
+}  // namespace
+
+Experiment Experiment::load(const std::string& path, const std::vector<std::string>& overrides) {
+  return build(loadYamlFile(path), path, overrides);
+}
+
+Experiment Experiment::parse(const std::string& text, const std::string& source,
+                             const std::vector<std::string>& overrides) {
+  return build(parseYaml(text, source), source, overrides);
+}
+
+void Experiment::bind(Settings& s) {
+  ExperimentSettings& e = settings_;
+  s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
+  s.bind("algorithm", e.algorithm, "what is trained", {"pmeta", "model_averaging", "independent"});
+  s.bind("seed", e.seed, "one seed, one result", Range::atLeast(0));
+  s.bind("rounds", e.rounds, "C: how often the meta-policy is aggregated", Range::between(1, 1e6));
+  s.bind("updates_per_round", e.updates_per_round, "R: personalised and auxiliary updates a round",
+         Range::between(1, 1e9));
+  s.bind("results_dir", e.results_dir, "where run folders go; \"\" means ~/.ros/pmeta");
+  s.bind("run_id", e.run_id, "name of the run; \"\" means start time, algorithm and seed");
+  s.bind("pace", e.pace, "least seconds between rounds, to watch a fast experiment",
+         Range::between(0, 3600));
+  s.bind("publish_trajectories", e.publish_trajectories,
+         "publish evaluation episodes for the viewer; false: no observation leaves an agent");
+
+  s.bind("personal.alpha", e.personal.alpha, "personalised learning rate", Range::above(0));
+  s.bind("personal.lambda", e.personal.lambda,
+         "strength of the pull towards the auxiliary parameters", Range::atLeast(0));
+  s.bind("personal.eta", e.personal.eta, "auxiliary learning rate", Range::atLeast(0));
+  s.bind("personal.personal_init", e.personal.personal_init,
+         "personal parameters at a round's start: the meta-policy's, or kept", {"meta", "keep"});
+
+  s.bind("q_learning.gamma", e.q_learning.gamma, "discount", Range::halfOpen(0, 1));
+  s.bind("q_learning.updates", e.q_learning.updates, "K: batches before each auxiliary update",
+         Range::between(1, 1e6));
+  s.bind("q_learning.samples_per_entry", e.q_learning.samples_per_entry,
+         "samples of a batch as a multiple of the entries the task owns", Range::above(0));
+  s.bind("q_learning.initial_value", e.q_learning.initial_value, "Q at the start");
+
+  s.bind("aggregation.beta", e.aggregation.beta, "mixing: meta <- (1 - beta) meta + beta mean",
+         Range::between(0, 1));
+  s.bind("aggregation.quorum", e.aggregation.quorum,
+         "updates that suffice once round_timeout has passed; 0 means all", Range::atLeast(0));
+  s.bind("aggregation.round_timeout", e.aggregation.round_timeout,
+         "seconds after which a round counts as late", Range::above(0));
+
+  s.bind("environment.name", e.environment, "family of environments", envFamilyNames());
+  family_->bind(s);
+}
+
+Experiment Experiment::build(const YAML::Node& root, const std::string& source,
+                             const std::vector<std::string>& overrides) {
+  Experiment experiment;
+  experiment.family_ = makeEnvFamily(environmentName(root, overrides));
+
+  Settings settings;
+  experiment.bind(settings);
+  settings.read(root, source);
+  for (const std::string& assignment : overrides) settings.assign(assignment);
+
+  ExperimentSettings& e = experiment.settings_;
+  checkName("experiment", e.experiment);
+  checkName("run_id", e.run_id);
+  if (e.experiment.empty()) throw Error("experiment is empty: give the experiment set a name.");
+  experiment.family_->build(static_cast<std::uint64_t>(e.seed));
+  if (e.aggregation.quorum > experiment.numTasks()) {
+    throw Error("aggregation.quorum is " + std::to_string(e.aggregation.quorum) +
+                " but there are " + std::to_string(experiment.numTasks()) +
+                " tasks: give at most that, or 0 for all.");
+  }
+  experiment.applyAlgorithm();
+  experiment.checkStability();
+  e.results_dir = expandResultsDir(e.results_dir);
+  if (e.run_id.empty()) {
+    e.run_id = utcStamp() + "_" + e.algorithm + "_seed" + std::to_string(e.seed);
+  }
+  experiment.yaml_ = settings.yaml();
+  experiment.table_ = settings.table();
+  return experiment;
+}
+
+std::string Experiment::describe(const std::string& environment) {
+  Experiment experiment;
+  experiment.family_ = makeEnvFamily(environment);
+  Settings settings;
+  experiment.bind(settings);
+  return settings.table(true);
+}
+
+void Experiment::applyAlgorithm() {
+  ExperimentSettings& e = settings_;
+  if (e.algorithm == "pmeta") return;
+  const std::string init = e.algorithm == "independent" ? "keep" : "meta";
+  std::vector<std::string> changes;
+  if (e.personal.lambda != 0) changes.push_back("personal.lambda to 0");
+  if (e.personal.personal_init != init) changes.push_back("personal.personal_init to " + init);
+  e.personal.lambda = 0;
+  e.personal.personal_init = init;
+  if (e.algorithm == "independent") {
+    if (e.aggregation.beta != 0) changes.push_back("aggregation.beta to 0");
+    e.aggregation.beta = 0;
+  }
+  if (!changes.empty())
+    notes_.push_back("algorithm " + e.algorithm + " sets " + join(changes) + ".");
+}
+
+void Experiment::checkStability() {
+  const PersonalSettings& p = settings_.personal;
+  const double gamma = settings_.q_learning.gamma;
+  // with frozen auxiliary parameters the update is a linear map that blows up beyond these
+  const double alpha_limit = 2 / (1 + p.lambda + gamma);
+  if (p.alpha >= alpha_limit) {
+    throw Error("personal.alpha = " + formatNumber(p.alpha) +
+                " with personal.lambda = " + formatNumber(p.lambda) +
+                " diverges: alpha must be below 2 / (1 + lambda + gamma) = " +
+                formatNumber(std::floor(alpha_limit * 1e6) / 1e6) + ".");
+  }
+  if (p.eta * p.lambda >= 2) {
+    throw Error("personal.eta = " + formatNumber(p.eta) +
+                " with personal.lambda = " + formatNumber(p.lambda) +
+                " diverges: eta must be below 2 / lambda = " + formatNumber(2 / p.lambda) + ".");
+  }
+  if (p.alpha * (1 + p.lambda) > 1) {
+    notes_.push_back("warning: alpha * (1 + lambda) = " + formatNumber(p.alpha * (1 + p.lambda)) +
+                     " is above 1: the personalised update overshoots.");
+  }
+  if (p.eta * p.lambda > 1) {
+    notes_.push_back("warning: eta * lambda = " + formatNumber(p.eta * p.lambda) +
+                     " is above 1: the auxiliary update overshoots.");
+  }
+}
+
+int Experiment::quorum() const {
+  return settings_.aggregation.quorum == 0 ? numTasks() : settings_.aggregation.quorum;
+}
+
+std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
+  std::unique_ptr<Env> env = family_->make(task);
+  auto* tabular = dynamic_cast<TabularEnv*>(env.get());
+  if (tabular == nullptr) {
+    throw Error("environment '" + settings_.environment +
+                "' is not tabular: q_learning cannot learn it.");
+  }
+  env.release();
+  return std::make_unique<TabularPersonalLearner>(std::unique_ptr<TabularEnv>(tabular),
+                                                  settings_.q_learning, settings_.personal);
+}
+
+std::string Experiment::runDir() const {
+  return settings_.results_dir + "/" + settings_.experiment + "/" + settings_.run_id;
+}
+
+std::string expandResultsDir(const std::string& results_dir) {
+  const std::string home = environmentVariable("HOME");
+  if (results_dir.empty()) {
+    const std::string ros_home = environmentVariable("ROS_HOME");
+    if (ros_home.empty() && home.empty()) {
+      throw Error("results_dir is not given and HOME is not set: give results_dir:=DIR.");
+    }
+    return (ros_home.empty() ? home + "/.ros" : ros_home) + "/pmeta";
+  }
+  std::string dir = results_dir;
+  if (dir == "~" || dir.rfind("~/", 0) == 0) dir = home + dir.substr(1);
+  // nodes run in other working folders than the shell
+  return std::filesystem::absolute(dir).lexically_normal().string();
+}
+
+void requireWritable(const std::string& dir) {
+  const auto fail = [&](const std::string& why) {
+    throw Error("the results folder " + dir + " cannot be written (" + why +
+                "): choose another with results_dir:=DIR.");
+  };
+  std::error_code error;
+  std::filesystem::create_directories(dir, error);
+  if (error) fail(error.message());
+  const std::string probe = dir + "/.write_probe_" + std::to_string(::getpid());
+  errno = 0;
+  std::ofstream file(probe);
+  file << "probe\n";
+  file.close();
+  const std::string why = std::strerror(errno);
+  const bool written = static_cast<bool>(file);
+  std::filesystem::remove(probe, error);
+  if (!written) fail(why);
+}
+
+std::string utcStamp() { return formatUtc("%Y%m%dT%H%M%S"); }
+std::string utcTime() { return formatUtc("%Y-%m-%dT%H:%M:%SZ"); }
+
+}  // namespace pmeta

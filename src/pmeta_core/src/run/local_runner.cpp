@@ -1,0 +1,41 @@
+#include "pmeta_core/run/local_runner.h"
+
+#include <chrono>
+
+#include "pmeta_core/base/error.h"
+
+namespace pmeta {
+
+LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound& on_round) {
+  MetaAggregator aggregator(experiment);
+  RoundBook book(experiment);
+  std::vector<TaskAgent> agents;
+  for (int task = 0; task < experiment.numTasks(); ++task) agents.emplace_back(experiment, task);
+
+  LocalResult result;
+  for (int round = 1; round <= experiment.settings().rounds && !result.stopped; ++round) {
+    const auto start = std::chrono::steady_clock::now();
+    for (TaskAgent& agent : agents) {
+      auto trained = agent.trainRound(aggregator.metaPolicy());
+      book.add(trained->personal);
+      const MetaAggregator::Answer answer =
+          aggregator.offer(std::make_shared<AuxiliaryUpdate>(std::move(trained->update)));
+      if (answer.verdict != MetaAggregator::Verdict::kAccepted) throw Error(answer.reason);
+    }
+    const std::vector<int> missing = aggregator.closeRound();
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    book.closeRound(round, aggregator.metaPolicy().participants, missing, seconds.count());
+    for (const TaskAgent& agent : agents) {
+      if (experiment.evaluatesMeta()) book.add(agent.evaluateMeta(aggregator.metaPolicy()));
+    }
+    for (RoundBook::Round& done : book.take()) {
+      if (log != nullptr) log->write(done);
+      if (on_round && !on_round(done.summary)) result.stopped = true;
+      result.rounds.push_back(std::move(done));
+    }
+  }
+  result.meta = aggregator.metaPolicy().model;
+  return result;
+}
+
+}  // namespace pmeta

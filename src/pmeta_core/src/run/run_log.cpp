@@ -1,0 +1,195 @@
+#include "pmeta_core/run/run_log.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/version.h"
+
+namespace pmeta {
+namespace {
+
+double meanReturn(const std::vector<RoundRow>& rows, Policy policy) {
+  double sum = 0;
+  int n = 0;
+  for (const RoundRow& row : rows) {
+    if (row.result.policy != policy || row.result.split != Split::kTrain) continue;
+    sum += row.result.mean;
+    ++n;
+  }
+  return n == 0 ? std::numeric_limits<double>::quiet_NaN() : sum / n;
+}
+
+}  // namespace
+
+RoundBook::RoundBook(const Experiment& experiment)
+    : num_tasks_(experiment.numTasks()),
+      rounds_(experiment.settings().rounds),
+      expects_meta_(experiment.evaluatesMeta()),
+      run_id_(experiment.settings().run_id),
+      env_steps_(experiment.numTasks(), 0),
+      updates_(experiment.numTasks(), 0) {}
+
+bool RoundBook::add(const TaskReturn& result) {
+  if (result.run_id != run_id_ || result.task < 0 || result.task >= num_tasks_ ||
+      result.round < next_ || result.round > rounds_) {
+    return false;
+  }
+  const auto key = std::make_pair(static_cast<int>(result.policy), result.task);
+  return open_[result.round].results.emplace(key, result).second;
+}
+
+void RoundBook::closeRound(int round, const std::vector<int>& participants,
+                           const std::vector<int>& missing, double seconds) {
+  Open& open = open_[round];
+  open.closed = true;
+  open.summary.run_id = run_id_;
+  open.summary.round = round;
+  open.summary.rounds = rounds_;
+  open.summary.participants = participants;
+  open.summary.missing = missing;
+  open.summary.seconds = seconds;
+}
+
+bool RoundBook::isComplete(const Open& open) const {
+  if (!open.closed) return false;
+  const auto has = [&](Policy policy, int task) {
+    return open.results.count({static_cast<int>(policy), task}) != 0;
+  };
+  for (const int task : open.summary.participants) {
+    if (!has(Policy::kPersonal, task)) return false;
+  }
+  for (int task = 0; expects_meta_ && task < num_tasks_; ++task) {
+    if (!has(Policy::kMeta, task)) return false;
+  }
+  return true;
+}
+
+std::vector<RoundBook::Round> RoundBook::take(bool force) {
+  std::vector<Round> taken;
+  for (auto it = open_.find(next_); it != open_.end(); it = open_.find(next_)) {
+    Open& open = it->second;
+    if (!isComplete(open) && !(force && open.closed)) break;
+    Round round;
+    round.summary = open.summary;
+    // the map's order is the file's order: policy, then task
+    for (auto& entry : open.results) {
+      RoundRow row;
+      row.result = entry.second;
+      row.env_steps = env_steps_[row.result.task] += row.result.env_steps;
+      row.updates = updates_[row.result.task] += row.result.updates;
+      round.rows.push_back(std::move(row));
+    }
+    seconds_ += round.summary.seconds;
+    round.summary.personal_return = meanReturn(round.rows, Policy::kPersonal);
+    round.summary.meta_return = meanReturn(round.rows, Policy::kMeta);
+    round.summary.eta_seconds = seconds_ / next_ * (rounds_ - next_);
+    taken.push_back(std::move(round));
+    open_.erase(it);
+    ++next_;
+  }
+  return taken;
+}
+
+std::vector<int> RoundBook::awaited() const {
+  std::vector<int> tasks;
+  const auto it = open_.find(next_);
+  for (int task = 0; task < num_tasks_; ++task) {
+    const auto has = [&](Policy policy) {
+      return it != open_.end() && it->second.results.count({static_cast<int>(policy), task}) != 0;
+    };
+    if (!has(Policy::kPersonal) || (expects_meta_ && !has(Policy::kMeta))) tasks.push_back(task);
+  }
+  return tasks;
+}
+
+RunLog::RunLog(const Experiment& experiment)
+    : experiment_(experiment), dir_(experiment.runDir()), started_(utcTime()) {
+  requireWritable(experiment.settings().results_dir);
+  if (std::filesystem::exists(dir_ + "/manifest.json")) {
+    throw Error("the run folder " + dir_ + " already holds a run: choose another run_id.");
+  }
+  requireWritable(dir_);
+  writeFileAtomically(dir_ + "/config.yaml", experiment.yaml());
+  writeManifest("running");
+  csv_.open(dir_ + "/rounds.csv");
+  csv_ << csvHeader() << "\n" << std::flush;
+}
+
+void RunLog::write(const RoundBook::Round& round) {
+  for (const RoundRow& row : round.rows) csv_ << csvLine(row) << "\n";
+  csv_.flush();
+  if (!csv_) {
+    throw Error("cannot write " + dir_ + "/rounds.csv (" + std::strerror(errno) +
+                "): is the disk full?");
+  }
+  rounds_done_ = round.summary.round;
+}
+
+void RunLog::finish(const std::string& status) { writeManifest(status); }
+
+const char* RunLog::csvHeader() {
+  return "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s";
+}
+
+std::string RunLog::csvLine(const RoundRow& row) {
+  const TaskReturn& r = row.result;
+  char seconds[32];
+  std::snprintf(seconds, sizeof seconds, "%.6f", r.seconds);
+  return std::to_string(r.round) + "," + std::to_string(r.task) + "," + name(r.split) + "," +
+         name(r.policy) + "," + formatNumber(r.mean) + "," + formatNumber(r.std) + "," +
+         std::to_string(r.episodes) + "," + std::to_string(row.env_steps) + "," +
+         std::to_string(row.updates) + "," + seconds;
+}
+
+void RunLog::writeManifest(const std::string& status) {
+  const ExperimentSettings& e = experiment_.settings();
+  nlohmann::ordered_json manifest;
+  manifest["experiment"] = e.experiment;
+  manifest["run_id"] = e.run_id;
+  manifest["algorithm"] = e.algorithm;
+  manifest["seed"] = e.seed;
+  manifest["status"] = status;
+  manifest["rounds_done"] = rounds_done_;
+  manifest["rounds"] = e.rounds;
+  manifest["started"] = started_;
+  manifest["ended"] =
+      status == "running" ? nlohmann::ordered_json() : nlohmann::ordered_json(utcTime());
+  manifest["commit"] = commit();
+  manifest["versions"] = versions();
+  manifest["tasks"] = nlohmann::ordered_json::array();
+  for (int task = 0; task < experiment_.numTasks(); ++task) {
+    manifest["tasks"].push_back({{"task", task},
+                                 {"split", "train"},
+                                 {"name", experiment_.family().taskName(task)},
+                                 {"description", experiment_.family().taskDescription(task)}});
+  }
+  writeFileAtomically(dir_ + "/manifest.json", manifest.dump(2) + "\n");
+}
+
+std::string runStatus(const std::string& run_dir) {
+  std::ifstream file(run_dir + "/manifest.json");
+  const auto manifest = nlohmann::json::parse(file, nullptr, false);
+  if (!manifest.is_object() || !manifest.contains("status") || !manifest["status"].is_string()) {
+    return "";
+  }
+  return manifest["status"];
+}
+
+void writeFileAtomically(const std::string& path, const std::string& text) {
+  const std::string temporary = path + ".tmp";
+  std::ofstream file(temporary, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw Error("cannot write " + path + " (" + std::strerror(errno) + ").");
+  std::error_code error;
+  std::filesystem::rename(temporary, path, error);
+  if (error) throw Error("cannot write " + path + " (" + error.message() + ").");
+}
+
+}  // namespace pmeta
