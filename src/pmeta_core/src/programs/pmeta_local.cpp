@@ -1,19 +1,211 @@
+// pmeta_local: experiments, sweeps and the theory's measurements in one process, without a ROS
+// master
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
+#include <exception>
+#include <filesystem>
 #include <iostream>
+#include <string>
+#include <thread>
+#include <vector>
+
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/run/convergence.h"
 #include "pmeta_core/run/local_runner.h"
-using namespace pmeta;
+#include "pmeta_core/run/sweep.h"
+
+namespace {
+
+using pmeta::Error;
+using pmeta::Experiment;
+
+constexpr char kUsage[] =
+    R"(usage: pmeta_local COMMAND ...
+
+  run CONFIG [key:=value ...]          run an experiment in this process
+  sweep CONFIG key:=a,b,c ... [--name NAME] [--jobs N]
+                                       run it for every combination of values; seed:=0-9 is a range.
+                                       Run again to go on where it stopped.
+  convergence CONFIG [key:=value ...]  measure the theory's statements on known models
+  check CONFIG [key:=value ...]        check the settings and print the effective ones as YAML
+  settings [ENVIRONMENT]               list every setting with its meaning
+
+CONFIG is a YAML file, e.g. config/gridworld.yaml. A key may be shortened to its last part where that
+is unambiguous (lambda for personal.lambda). Results go to results_dir, by default ~/.ros/pmeta.
+)";
+
+std::atomic<bool> g_stop{false};
+
+void onSignal(int) { g_stop = true; }
+
+struct Arguments {
+  std::vector<std::string> words;  ///< all that is neither an option nor ROS's own remapping
+  std::string name;
+  int jobs = std::max(1u, std::thread::hardware_concurrency());
+};
+
+Arguments parseArguments(int argc, char** argv) {
+  Arguments arguments;
+  const auto value = [&](int& i) -> std::string {
+    if (i + 1 >= argc) throw Error(std::string(argv[i]) + " needs a value.");
+    return argv[++i];
+  };
+  for (int i = 2; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word.rfind("__", 0) == 0) continue;  // roslaunch adds __name:= and __log:=
+    if (word == "--name") {
+      arguments.name = value(i);
+    } else if (word == "--jobs") {
+      const std::string jobs = value(i);
+      arguments.jobs = std::atoi(jobs.c_str());
+      if (arguments.jobs < 1 || arguments.jobs > 1024) {
+        throw Error("--jobs is '" + jobs + "' but must be a whole number, from 1 to 1024.");
+      }
+    } else if (word.rfind("-", 0) == 0) {
+      throw Error("unknown option '" + word + "': see pmeta_local --help.");
+    } else {
+      arguments.words.push_back(word);
+    }
+  }
+  return arguments;
+}
+
+std::string takeConfig(Arguments& arguments) {
+  if (arguments.words.empty() || arguments.words.front().find(":=") != std::string::npos) {
+    throw Error("which settings file? Give it first, e.g. config/gridworld.yaml.");
+  }
+  const std::string config = arguments.words.front();
+  arguments.words.erase(arguments.words.begin());
+  return config;
+}
+
+std::string shortNumber(double value) {
+  if (std::isnan(value)) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
+}
+
+std::string duration(double seconds) {
+  char text[32];
+  const long whole = std::lround(seconds);
+  if (seconds < 10) {
+    std::snprintf(text, sizeof text, "%.1f s", seconds);
+  } else if (whole < 3600) {
+    std::snprintf(text, sizeof text, "%ld:%02ld min", whole / 60, whole % 60);
+  } else {
+    std::snprintf(text, sizeof text, "%ld:%02ld h", whole / 3600, whole / 60 % 60);
+  }
+  return text;
+}
+
+void printNotes(const Experiment& experiment) {
+  for (const std::string& note : experiment.notes()) std::cerr << note << "\n";
+}
+
+int run(Arguments arguments) {
+  const std::string config = takeConfig(arguments);
+  const Experiment experiment = Experiment::load(config, arguments.words);
+  pmeta::RunLog log(experiment);
+  std::cout << "settings\n" << experiment.table() << std::flush;
+  printNotes(experiment);
+  const pmeta::LocalResult result =
+      pmeta::runLocally(experiment, &log, [](const pmeta::RoundSummary& summary) {
+        std::printf("round %d/%d  PP %s  MP %s  %s  ETA %s\n", summary.round, summary.rounds,
+                    shortNumber(summary.personal_return).c_str(),
+                    shortNumber(summary.meta_return).c_str(), duration(summary.seconds).c_str(),
+                    duration(summary.eta_seconds).c_str());
+        std::fflush(stdout);
+        return !g_stop;
+      });
+  log.finish(result.stopped ? "stopped" : "finished");
+  std::cout << (result.stopped ? "stopped; " : "") << "results in " << log.dir() << std::endl;
+  return result.stopped ? 130 : 0;
+}
+
+int sweep(Arguments arguments) {
+  pmeta::SweepPlan plan;
+  plan.config = takeConfig(arguments);
+  plan.assignments = arguments.words;
+  plan.jobs = arguments.jobs;
+  plan.name =
+      arguments.name.empty() ? std::filesystem::path(plan.config).stem().string() : arguments.name;
+  int found = 0;
+  int done = 0;
+  int total = 0;
+  const std::string folder =
+      pmeta::runSweep(plan, g_stop, [&](const pmeta::SweepProgress& progress) {
+        done = progress.done;
+        total = progress.total;
+        if (progress.skipped) {
+          ++found;
+          return;
+        }
+        std::printf("[%d/%d] %s  PP %s  MP %s  %s  ETA %s\n", progress.done, progress.total,
+                    progress.run_id.c_str(), shortNumber(progress.personal_return).c_str(),
+                    shortNumber(progress.meta_return).c_str(), duration(progress.seconds).c_str(),
+                    duration(progress.eta_seconds).c_str());
+        std::fflush(stdout);
+      });
+  if (found > 0) std::cout << found << " runs had been finished before\n";
+  const bool stopped = done < total;
+  std::cout << (stopped ? "stopped; the same command goes on. Runs in " : "runs in ") << folder
+            << std::endl;
+  return stopped ? 130 : 0;
+}
+
+int check(Arguments arguments) {
+  const std::string config = takeConfig(arguments);
+  const Experiment experiment = Experiment::load(config, arguments.words);
+  printNotes(experiment);
+  std::cout << experiment.yaml();
+  return 0;
+}
+
+int settings(const Arguments& arguments) {
+  std::cout << Experiment::describe(arguments.words.empty() ? "gridworld"
+                                                            : arguments.words.front());
+  return 0;
+}
+
+int convergence(Arguments arguments) {
+  const std::string config = takeConfig(arguments);
+  return pmeta::runConvergence(config, arguments.words, std::cout);
+}
+
+int dispatch(int argc, char** argv) {
+  const std::string command = argc > 1 ? argv[1] : "";
+  const bool wants_help = std::any_of(argv + 1, argv + argc, [](const char* word) {
+    return std::strcmp(word, "--help") == 0 || std::strcmp(word, "-h") == 0;
+  });
+  if (wants_help || command == "help") {
+    std::cout << kUsage;
+    return 0;
+  }
+  if (command == "run") return run(parseArguments(argc, argv));
+  if (command == "sweep") return sweep(parseArguments(argc, argv));
+  if (command == "convergence") return convergence(parseArguments(argc, argv));
+  if (command == "check") return check(parseArguments(argc, argv));
+  if (command == "settings") return settings(parseArguments(argc, argv));
+  std::cerr << (command.empty() ? "" : "unknown command '" + command + "'\n") << kUsage;
+  return 2;
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  std::signal(SIGINT, onSignal);
+  std::signal(SIGTERM, onSignal);
   try {
-    std::vector<std::string> o(argv + 2, argv + argc);
-    auto e = Experiment::load(argv[1], o);
-    for (auto& n : e.notes()) std::cerr << n << "\n";
-    runLocally(e, nullptr, [](const RoundSummary& s) {
-      std::printf("%d %.3f %.3f\n", s.round, s.personal_return, s.meta_return);
-      return true;
-    });
-  } catch (const Error& x) {
-    std::cerr << x.what() << "\n";
+    return dispatch(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << "pmeta: " << error.what() << std::endl;
     return 1;
   }
 }

@@ -96,6 +96,15 @@ std::vector<RoundBook::Round> RoundBook::take(bool force) {
   return taken;
 }
 
+bool RoundBook::hasPersonal(int round) const {
+  const auto it = open_.find(round);
+  if (it == open_.end()) return false;
+  for (int task = 0; task < num_tasks_; ++task) {
+    if (it->second.results.count({static_cast<int>(Policy::kPersonal), task}) == 0) return false;
+  }
+  return true;
+}
+
 std::vector<int> RoundBook::awaited() const {
   std::vector<int> tasks;
   const auto it = open_.find(next_);

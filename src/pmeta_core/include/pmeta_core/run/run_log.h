@@ -42,6 +42,8 @@ class RoundBook {
   std::vector<Round> take(bool force = false);
 
   int roundsTaken() const { return next_ - 1; }
+  /// Has every task's personal return of `round` arrived?
+  bool hasPersonal(int round) const;
   /// Tasks whose returns the oldest open round still waits for.
   std::vector<int> awaited() const;
 

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/run/experiment.h"
+
+namespace pmeta {
+
+/// One experiment over every combination of some settings' values.
+struct SweepPlan {
+  std::string name;    ///< runs go to <results_dir>/sweeps/<name>/<experiment>/<run_id>
+  std::string config;  ///< path of the settings file
+  /// "key:=a,b,c", "seed:=0-9" (a range of whole numbers), or "key:=value" for all runs.
+  std::vector<std::string> assignments;
+  int jobs = 1;  ///< runs at a time, one thread each
+};
+
+/// Progress of a sweep after one more run.
+struct SweepProgress {
+  int done = 0;  ///< runs finished or found finished
+  int total = 0;
+  bool skipped = false;  ///< this one was found finished
+  std::string run_id;
+  double personal_return = 0;  ///< of the run's last round; NaN if skipped
+  double meta_return = 0;
+  double seconds = 0;      ///< of this run
+  double eta_seconds = 0;  ///< for the rest
+};
+
+/// The runs of a plan, checked, each once: combinations with equal effective settings (an algorithm
+/// may fix some) are one run. Throws Error before anything is run.
+std::vector<Experiment> planSweep(const SweepPlan& plan);
+
+/// Runs what is not finished yet, `plan.jobs` at a time; a run that was cut off begins anew. Stops
+/// early, keeping what is finished, when `stop` becomes true. Calls on_progress from one thread at a
+/// time. Returns the folder that holds the runs. Throws Error if a finished run there has other
+/// settings under the same name.
+std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
+                     const std::function<void(const SweepProgress&)>& on_progress);
+
+}  // namespace pmeta

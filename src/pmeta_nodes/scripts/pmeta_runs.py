@@ -1,0 +1,407 @@
+"""Run folders as pMeta writes them: found, read, checked, and grouped by settings.
+
+A run folder holds config.yaml, manifest.json and rounds.csv. A group is all runs of one experiment
+whose settings are equal but for the seed; a group's curves are seeds x rounds, each entry the mean
+return over the training tasks.
+"""
+
+import json
+import math
+import os
+import sys
+
+import numpy as np
+import yaml
+
+HEADER = "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s"
+CONVERGENCE_FILES = ("statements.csv", "gradient.csv", "contraction.csv", "distance.csv")
+
+# settings that name a run or pace it, and do not shape its result
+NAMES = {"experiment", "algorithm", "seed", "run_id", "results_dir", "pace", "publish_trajectories"}
+# settings an algorithm fixes or does not use: they tell no two groups of it apart
+PROXIMAL = {"personal.lambda", "personal.eta", "personal.personal_init", "personal.proximal"}
+UNUSED = {
+    "model_averaging": PROXIMAL,
+    "independent": PROXIMAL | {"aggregation.beta", "aggregation.quorum", "aggregation.round_timeout"},
+}
+DEFAULTS = {"personal.lambda": 10, "personal.personal_init": "meta"}
+ALGORITHMS = {"pmeta": "pMeta-RL", "model_averaging": "model averaging",
+              "independent": "independent"}
+SYMBOLS = {"personal.lambda": "λ", "personal.alpha": "α", "personal.eta": "η",
+           "aggregation.beta": "β", "q_learning.gamma": "γ", "q_learning.updates": "K",
+           "updates_per_round": "R", "rounds": "C"}
+
+
+class PlotError(Exception):
+    """What is wrong with the input, in one sentence."""
+
+
+def warn(text):
+    print("plot: warning: " + text, file=sys.stderr)
+
+
+def find_folders(dirs):
+    """Run folders and convergence folders in and below `dirs`, each once, in a fixed order."""
+    runs, convergence = {}, {}
+    for top in dirs:
+        if not os.path.isdir(top):
+            raise PlotError("there is no folder %s." % top)
+        for folder, subfolders, files in os.walk(top, onerror=_refuse):
+            subfolders.sort()
+            if any(name in files for name in CONVERGENCE_FILES):
+                convergence.setdefault(os.path.realpath(folder), folder)
+            elif "manifest.json" in files and "rounds.csv" in files:
+                runs.setdefault(os.path.realpath(folder), folder)
+            elif "manifest.json" in files:
+                warn("%s is left out: it has a manifest.json but no rounds.csv." % folder)
+    return list(runs.values()), list(convergence.values())
+
+
+def _refuse(error):
+    raise error
+
+
+class Run:
+    """A finished run: its settings, and per round the mean return over the training tasks."""
+
+    def __init__(self, folder, manifest):
+        self.folder = folder
+        config = read_yaml(os.path.join(folder, "config.yaml"))
+        self.settings = _flatten(config)
+        self.experiment = str(_required(folder, manifest, "experiment", str))
+        self.algorithm = str(_required(folder, manifest, "algorithm", str))
+        self.seed = _required(folder, manifest, "seed", int)
+        self.num_rounds = _required(folder, manifest, "rounds", int)
+        self.started = str(manifest.get("started") or "")
+        self.commit = str(manifest.get("commit") or "unknown")
+        self.optimal = _optimal_return(manifest)
+        path = os.path.join(folder, "rounds.csv")
+        returns = read_rounds(path)
+        self.rounds = np.arange(1, self.num_rounds + 1)
+        self.curves = {policy: self._curve(path, policy, by_round)
+                       for policy, by_round in returns.items()}
+        if not self.curves:
+            raise PlotError("%s holds no returns although the run has finished." % path)
+
+    def _curve(self, path, policy, by_round):
+        last = max(by_round)
+        if last != self.num_rounds:
+            raise PlotError("%s ends with round %d (%s) but its manifest.json says %d rounds."
+                            % (path, last, policy, self.num_rounds))
+        tasks = max(len(by_task) for by_task in by_round.values())
+        short = [r for r in by_round if len(by_round[r]) < tasks]
+        if short:
+            warn("%s: %s returns of some tasks are missing in %d rounds (first: round %d); "
+                 "their means are over the tasks that reported."
+                 % (self.folder, policy, len(short), min(short)))
+        for r in self.rounds:
+            if r not in by_round:
+                raise PlotError("%s has no %s return of round %d." % (path, policy, r))
+        return np.array([np.mean(list(by_round[r].values())) for r in self.rounds])
+
+
+def load_runs(folders):
+    """Reads the finished runs and names those left out; throws PlotError."""
+    runs = []
+    for folder in folders:
+        path = os.path.join(folder, "manifest.json")
+        try:
+            manifest = json.loads(read_text(path))
+        except ValueError as error:
+            raise PlotError("%s is not valid JSON: %s." % (path, error))
+        if not isinstance(manifest, dict):
+            raise PlotError("%s must hold a JSON object." % path)
+        status = manifest.get("status")
+        if status == "finished":
+            runs.append(Run(folder, manifest))
+        else:
+            warn("%s is left out: its status is '%s' (%s of %s rounds), not 'finished'."
+                 % (folder, status, manifest.get("rounds_done", "?"), manifest.get("rounds", "?")))
+    return runs
+
+
+def read_rounds(path):
+    """{policy: {round: {task: return_mean}}} of the training split of a rounds.csv."""
+    returns = {}
+    skipped = 0
+    for number, fields in read_csv(path, HEADER):
+        where = "%s line %d" % (path, number)
+        row = dict(zip(HEADER.split(","), fields))
+        round_, task = to_int(where, "round", row["round"]), to_int(where, "task", row["task"])
+        for key in ("return_mean", "return_std", "episodes", "env_steps", "updates", "wall_s"):
+            row[key] = to_number(where, key, row[key])
+        if row["policy"] not in ("personal", "meta") or row["split"] not in ("train", "test"):
+            raise PlotError("%s: split and policy are '%s' and '%s' but must be train or test, and "
+                            "personal or meta." % (where, row["split"], row["policy"]))
+        if round_ < 1 or task < 0:
+            raise PlotError("%s: round %d, task %d is out of range." % (where, round_, task))
+        if row["split"] == "test":
+            skipped += 1
+            continue
+        by_task = returns.setdefault(row["policy"], {}).setdefault(round_, {})
+        if task in by_task:
+            raise PlotError("%s repeats round %d, task %d, %s." % (where, round_, task,
+                                                                  row["policy"]))
+        by_task[task] = row["return_mean"]
+    if skipped:
+        warn("%s: %d rows of test tasks are not drawn." % (path, skipped))
+    return returns
+
+
+def read_text(path):
+    try:
+        with open(path, encoding="utf-8") as file:
+            return file.read()
+    except UnicodeDecodeError:
+        raise PlotError("%s is not a text file." % path)
+
+
+def read_csv(path, header=None):
+    """(line number, fields) of every row below the header; without `header` any will do."""
+    text = read_text(path)
+    if not text:
+        raise PlotError("%s line 1: the file is empty." % path)
+    lines = text.split("\n")
+    if header is not None and lines[0] != header:
+        raise PlotError("%s line 1: the header must be '%s'." % (path, header))
+    if lines[-1] != "":
+        raise PlotError("%s line %d is truncated: it does not end." % (path, len(lines)))
+    columns = lines[0].count(",") + 1
+    rows = []
+    for number, line in enumerate(lines[1:-1], start=2):
+        fields = line.split(",")
+        if len(fields) != columns:
+            raise PlotError("%s line %d has %d fields instead of %d."
+                            % (path, number, len(fields), columns))
+        rows.append((number, fields))
+    return rows
+
+
+def to_number(where, key, text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise PlotError("%s: %s is '%s', not a finite number." % (where, key, text))
+    return value
+
+
+def to_int(where, key, text):
+    try:
+        return int(text)
+    except ValueError:
+        raise PlotError("%s: %s is '%s', not a whole number." % (where, key, text))
+
+
+def read_yaml(path):
+    try:
+        data = yaml.safe_load(read_text(path))
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = " line %d" % (mark.line + 1) if mark else ""
+        raise PlotError("%s%s is not valid YAML." % (path, line))
+    if not isinstance(data, dict):
+        raise PlotError("%s must hold settings as 'key: value' lines." % path)
+    return data
+
+
+def _required(folder, manifest, key, kind):
+    value = manifest.get(key)
+    if not isinstance(value, kind) or isinstance(value, bool):
+        raise PlotError("%s/manifest.json: '%s' is missing or of the wrong type." % (folder, key))
+    return value
+
+
+def _optimal_return(manifest):
+    """Mean over the tasks, or None unless every task knows its own."""
+    tasks = manifest.get("tasks")
+    if not isinstance(tasks, list) or not tasks:
+        return None
+    values = [task.get("optimal_return") if isinstance(task, dict) else None for task in tasks]
+    if not all(is_number(value) for value in values):
+        return None
+    return float(np.mean(values))
+
+
+def is_number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _flatten(config, prefix=""):
+    flat = {}
+    for key, value in config.items():
+        if isinstance(value, dict):
+            flat.update(_flatten(value, prefix + str(key) + "."))
+        else:
+            flat[prefix + str(key)] = _plain(value)
+    return flat
+
+
+def _plain(value):
+    """A value that can be compared and hashed; YAML 1.1 takes 1e-05 for text, which it is not."""
+    if isinstance(value, list):
+        return _plain(value[0]) if len(value) == 1 else tuple(_plain(item) for item in value)
+    if isinstance(value, dict):
+        return tuple(sorted(_flatten(value).items()))
+    if isinstance(value, str):
+        try:
+            return float(value) if math.isfinite(float(value)) else value
+        except ValueError:
+            return value
+    return value
+
+
+class Group:
+    """Runs of one algorithm with equal settings, one a seed, in the order of their seeds."""
+
+    def __init__(self, algorithm, settings, runs):
+        self.algorithm = algorithm
+        self.settings = settings
+        self.runs = runs
+        self.seeds = [run.seed for run in runs]
+        self.label = ALGORITHMS.get(algorithm, algorithm.replace("_", " "))
+        self.policies = [p for p in ("personal", "meta") if all(p in r.curves for r in runs)]
+
+    @property
+    def rounds(self):
+        return self.runs[0].rounds
+
+    def curves(self, policy):
+        """Seeds x rounds."""
+        return np.array([run.curves[policy] for run in self.runs])
+
+    def last(self, policy):
+        return self.curves(policy)[:, -1]
+
+    def auc(self, policy):
+        """Mean over the rounds: the area under the curve, in units of return."""
+        return self.curves(policy).mean(axis=1)
+
+    def optimal(self):
+        values = [run.optimal for run in self.runs]
+        return None if None in values else float(np.mean(values))
+
+    def context(self):
+        """The settings that a baseline shares."""
+        return tuple(sorted((k, v) for k, v in self.settings.items() if k not in PROXIMAL))
+
+
+def group_runs(runs):
+    """{experiment: [Group]}, labelled by the settings that differ within the experiment."""
+    buckets = {}
+    for run in runs:
+        unused = NAMES | UNUSED.get(run.algorithm, set())
+        settings = tuple(sorted((k, v) for k, v in run.settings.items() if k not in unused))
+        buckets.setdefault(run.experiment, {}).setdefault((run.algorithm, settings), []).append(run)
+    experiments = {}
+    for experiment in sorted(buckets):
+        groups = [Group(algorithm, dict(settings), _one_a_seed(members))
+                  for (algorithm, settings), members in buckets[experiment].items()]
+        order = list(ALGORITHMS)
+        keys = varying(groups)
+        groups.sort(key=lambda g: (order.index(g.algorithm) if g.algorithm in order else len(order),
+                                   g.algorithm, [sort_key(g.settings.get(k)) for k in keys]))
+        for group in groups:
+            group.label = " ".join([group.label] + setting_texts(group, keys))
+        experiments[experiment] = groups
+    return experiments
+
+
+def _one_a_seed(runs):
+    """The newest run of every seed; says so where an older one differs."""
+    newest = {}
+    for run in sorted(runs, key=lambda r: (r.seed, r.started, r.folder)):
+        old = newest.get(run.seed)
+        if old is not None and not _same_curves(old, run):
+            warn("%s is left out: %s has the same settings and seed, is newer, and differs."
+                 % (old.folder, run.folder))
+        newest[run.seed] = run
+    return list(newest.values())
+
+
+def _same_curves(a, b):
+    return a.curves.keys() == b.curves.keys() and all(
+        np.array_equal(a.curves[policy], b.curves[policy]) for policy in a.curves)
+
+
+def varying(groups):
+    """Keys whose value differs between groups that use them: lambda, then by name."""
+    keys = sorted(set(key for group in groups for key in group.settings),
+                  key=lambda key: (key != "personal.lambda", key))
+    return [key for key in keys if len(set(
+        group.settings.get(key) for group in groups
+        if key not in UNUSED.get(group.algorithm, set()))) > 1]
+
+
+def setting_texts(group, keys):
+    """["λ=10", …] of the keys it uses; lambda always, being what makes pMeta-RL."""
+    shown = list(keys)
+    if "personal.lambda" in group.settings and "personal.lambda" not in keys:
+        shown.insert(0, "personal.lambda")
+    unused = UNUSED.get(group.algorithm, set())
+    return [setting_text(k, group.settings.get(k)) for k in shown if k not in unused]
+
+
+def fixed_texts(group, groups, key):
+    """["η=0.08", …]: the settings besides `key` that differ between `groups`."""
+    return [setting_text(k, group.settings.get(k)) for k in varying(groups) if k != key]
+
+
+def short_name(key):
+    return key.split(".")[-1]
+
+
+def symbol(key):
+    return SYMBOLS.get(key, short_name(key))
+
+
+def setting_text(key, value):
+    return symbol(key) + "=" + value_text(value)
+
+
+def value_text(value):
+    if isinstance(value, tuple):
+        return "[" + ",".join(value_text(item) for item in value) + "]"
+    if is_number(value):
+        return "%.6g" % value
+    return "unset" if value is None else str(value)
+
+
+def sort_key(value):
+    return (0, value, "") if is_number(value) else (1, 0, value_text(value))
+
+
+def reference(groups):
+    """The group whose settings most runs share; among equals the default, then the middle one."""
+    keys = varying(groups)
+
+    def score(group):
+        shared = sum(len(other.runs) for key in keys for other in groups
+                     if other.settings.get(key) == group.settings.get(key))
+        return shared, sum(group.settings.get(k) == v for k, v in DEFAULTS.items())
+
+    best = max(score(group) for group in groups)
+    candidates = [group for group in groups if score(group) == best]
+    return candidates[(len(candidates) - 1) // 2]
+
+
+def baseline_of(group, groups, algorithm="model_averaging"):
+    """The group of `algorithm` with the settings of `group` in all that it uses, or None."""
+    unused = UNUSED.get(algorithm, set())
+    wanted = {k: v for k, v in group.settings.items() if k not in unused}
+    for other in groups:
+        if other.algorithm == algorithm and other.settings == wanted:
+            return other
+    return None
+
+
+def slices(groups, key):
+    """Lists of groups that differ in `key` alone, each sorted by it; only where it does vary."""
+    by_rest = {}
+    for group in groups:
+        rest = tuple(sorted((k, v) for k, v in group.settings.items() if k != key))
+        by_rest.setdefault(rest, []).append(group)
+    found = [sorted(members, key=lambda g: sort_key(g.settings.get(key)))
+             for members in by_rest.values()]
+    return [members for members in found if len(members) > 1]

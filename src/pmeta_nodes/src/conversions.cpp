@@ -1,0 +1,202 @@
+#include "conversions.h"
+
+#include <limits>
+#include <numeric>
+
+#include "pmeta_core/base/error.h"
+
+namespace pmeta_nodes {
+namespace {
+
+using pmeta::Error;
+
+std::vector<std::uint32_t> toUnsigned(const std::vector<int>& values) {
+  return std::vector<std::uint32_t>(values.begin(), values.end());
+}
+
+// indices beyond int cannot be a task or round of any run
+int toInt(std::uint32_t value, const char* what) {
+  if (value > static_cast<std::uint32_t>(std::numeric_limits<int>::max())) {
+    throw Error(std::string("a message has an impossible ") + what + ", " + std::to_string(value) +
+                ".");
+  }
+  return static_cast<int>(value);
+}
+
+}  // namespace
+
+pmeta_msgs::ModelBlob toMsg(const pmeta::Model& model) {
+  pmeta_msgs::ModelBlob msg;
+  msg.layout = model.layout.text();
+  msg.layout_hash = model.layout.hash();
+  if (model.layout.precision() == pmeta::Precision::kFloat32) {
+    msg.float32_values = model.floats();
+  } else {
+    msg.float64_values = model.doubles();
+  }
+  msg.present = model.present;
+  msg.checksum = model.checksum();
+  return msg;
+}
+
+pmeta::Model fromMsg(const pmeta_msgs::ModelBlob& msg) {
+  pmeta::Model model;
+  model.layout = pmeta::ModelLayout::parse(msg.layout);
+  if (model.layout.hash() != msg.layout_hash) {
+    throw Error("a model's layout hash " + pmeta::hexHash(msg.layout_hash) +
+                " does not fit its layout, whose hash is " + pmeta::hexHash(model.layout.hash()) +
+                ".");
+  }
+  const bool is_float = model.layout.precision() == pmeta::Precision::kFloat32;
+  const std::size_t sent = is_float ? msg.float32_values.size() : msg.float64_values.size();
+  const std::size_t other = is_float ? msg.float64_values.size() : msg.float32_values.size();
+  if (other != 0) throw Error("a model carries values of another precision than its layout says.");
+  if (sent != model.layout.size()) {
+    throw Error("a model carries " + std::to_string(sent) + " values where its layout has " +
+                std::to_string(model.layout.size()) + ".");
+  }
+  if (!msg.present.empty() && msg.present.size() != sent) {
+    throw Error("a model carries a presence mask of " + std::to_string(msg.present.size()) +
+                " entries for " + std::to_string(sent) + " values.");
+  }
+  if (is_float) {
+    model.values = msg.float32_values;
+  } else {
+    model.values = msg.float64_values;
+  }
+  model.present = msg.present;
+  if (model.checksum() != msg.checksum) {
+    throw Error("a model's checksum does not fit its values: it was damaged on the way.");
+  }
+  return model;
+}
+
+pmeta_msgs::MetaPolicy toMsg(const pmeta::MetaPolicy& meta, int rounds) {
+  pmeta_msgs::MetaPolicy msg;
+  msg.run_id = meta.run_id;
+  msg.round = static_cast<std::uint32_t>(meta.round);
+  msg.rounds = static_cast<std::uint32_t>(rounds);
+  msg.model = toMsg(meta.model);
+  msg.participants = toUnsigned(meta.participants);
+  return msg;
+}
+
+pmeta::MetaPolicy fromMsg(const pmeta_msgs::MetaPolicy& msg) {
+  pmeta::MetaPolicy meta;
+  meta.run_id = msg.run_id;
+  meta.round = toInt(msg.round, "round");
+  meta.model = fromMsg(msg.model);
+  for (const std::uint32_t task : msg.participants) {
+    meta.participants.push_back(toInt(task, "task"));
+  }
+  return meta;
+}
+
+pmeta_msgs::AuxiliaryUpdate toMsg(const pmeta::AuxiliaryUpdate& update) {
+  pmeta_msgs::AuxiliaryUpdate msg;
+  msg.run_id = update.run_id;
+  msg.task = static_cast<std::uint32_t>(update.task);
+  msg.round = static_cast<std::uint32_t>(update.round);
+  msg.model = toMsg(update.model);
+  msg.weight = update.weight;
+  return msg;
+}
+
+pmeta::AuxiliaryUpdate fromMsg(const pmeta_msgs::AuxiliaryUpdate& msg) {
+  pmeta::AuxiliaryUpdate update;
+  update.run_id = msg.run_id;
+  update.task = toInt(msg.task, "task");
+  update.round = toInt(msg.round, "round");
+  update.model = fromMsg(msg.model);
+  update.weight = msg.weight;
+  return update;
+}
+
+pmeta_msgs::TaskReturn toMsg(const pmeta::TaskReturn& result, const std::string& task_name) {
+  pmeta_msgs::TaskReturn msg;
+  msg.run_id = result.run_id;
+  msg.task = static_cast<std::uint32_t>(result.task);
+  msg.task_name = task_name;
+  msg.round = static_cast<std::uint32_t>(result.round);
+  msg.policy = result.policy == pmeta::Policy::kPersonal ? pmeta_msgs::TaskReturn::PERSONAL
+                                                         : pmeta_msgs::TaskReturn::META;
+  msg.split = result.split == pmeta::Split::kTrain ? pmeta_msgs::TaskReturn::TRAIN
+                                                   : pmeta_msgs::TaskReturn::TEST;
+  msg.policy_name = pmeta::name(result.policy);
+  msg.split_name = pmeta::name(result.split);
+  msg.return_mean = result.mean;
+  msg.return_std = result.std;
+  msg.episodes = static_cast<std::uint32_t>(result.episodes);
+  msg.env_steps = static_cast<std::uint64_t>(result.env_steps);
+  msg.updates = static_cast<std::uint64_t>(result.updates);
+  msg.wall_s = result.seconds;
+  return msg;
+}
+
+pmeta::TaskReturn fromMsg(const pmeta_msgs::TaskReturn& msg) {
+  if (msg.policy != pmeta_msgs::TaskReturn::PERSONAL &&
+      msg.policy != pmeta_msgs::TaskReturn::META) {
+    throw Error("a return is of no known policy (" + std::to_string(msg.policy) + ").");
+  }
+  if (msg.split != pmeta_msgs::TaskReturn::TRAIN && msg.split != pmeta_msgs::TaskReturn::TEST) {
+    throw Error("a return is of no known split (" + std::to_string(msg.split) + ").");
+  }
+  pmeta::TaskReturn result;
+  result.run_id = msg.run_id;
+  result.task = toInt(msg.task, "task");
+  result.round = toInt(msg.round, "round");
+  result.policy = msg.policy == pmeta_msgs::TaskReturn::PERSONAL ? pmeta::Policy::kPersonal
+                                                                 : pmeta::Policy::kMeta;
+  result.split =
+      msg.split == pmeta_msgs::TaskReturn::TRAIN ? pmeta::Split::kTrain : pmeta::Split::kTest;
+  result.mean = msg.return_mean;
+  result.std = msg.return_std;
+  result.episodes = toInt(msg.episodes, "number of episodes");
+  result.env_steps = static_cast<std::int64_t>(msg.env_steps);
+  result.updates = static_cast<std::int64_t>(msg.updates);
+  result.seconds = msg.wall_s;
+  return result;
+}
+
+pmeta_msgs::Trajectory toMsg(const pmeta::Episode& episode, const pmeta::Experiment& experiment,
+                             int task, int round, pmeta::Policy policy) {
+  pmeta_msgs::Trajectory msg;
+  msg.header.frame_id = "task_" + std::to_string(task);
+  msg.run_id = experiment.settings().run_id;
+  msg.task = static_cast<std::uint32_t>(task);
+  msg.task_name = experiment.family().taskName(task);
+  msg.task_description = experiment.family().taskDescription(task);
+  msg.environment = experiment.settings().environment;
+  msg.round = static_cast<std::uint32_t>(round);
+  msg.policy = policy == pmeta::Policy::kPersonal ? pmeta_msgs::Trajectory::PERSONAL
+                                                  : pmeta_msgs::Trajectory::META;
+  msg.observation_size = static_cast<std::uint32_t>(episode.observation_size);
+  msg.observations = episode.observations;
+  msg.action_size = static_cast<std::uint32_t>(episode.action_size);
+  msg.actions = episode.actions;
+  msg.rewards = episode.rewards;
+  msg.terminated = episode.terminated;
+  msg.truncated = episode.truncated;
+  msg.episode_return = std::accumulate(episode.rewards.begin(), episode.rewards.end(), 0.0);
+  msg.state_values = episode.state_values;
+  msg.greedy_actions = episode.greedy_actions;
+  return msg;
+}
+
+pmeta_msgs::RoundSummary toMsg(const pmeta::RoundSummary& summary,
+                               const pmeta::Experiment& experiment) {
+  pmeta_msgs::RoundSummary msg;
+  msg.run_id = summary.run_id;
+  msg.experiment = experiment.settings().experiment;
+  msg.round = static_cast<std::uint32_t>(summary.round);
+  msg.rounds = static_cast<std::uint32_t>(summary.rounds);
+  msg.personal_return = summary.personal_return;
+  msg.meta_return = summary.meta_return;
+  msg.participants = toUnsigned(summary.participants);
+  msg.missing = toUnsigned(summary.missing);
+  msg.round_s = summary.seconds;
+  msg.eta_s = summary.eta_seconds;
+  return msg;
+}
+
+}  // namespace pmeta_nodes

@@ -1,0 +1,610 @@
+#include "gridworld_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <set>
+#include <utility>
+
+namespace pmeta_nodes {
+namespace {
+
+using pmeta_msgs::RoundSummary;
+using pmeta_msgs::TaskReturn;
+using pmeta_msgs::Trajectory;
+using visualization_msgs::Marker;
+using visualization_msgs::MarkerArray;
+using Color = std_msgs::ColorRGBA;
+
+constexpr double kPi = 3.14159265358979323846;
+
+// scene bands, from the top: title, grids, legend
+constexpr double kTitleHeight = 1.05;
+constexpr double kLegendHeight = 0.55;
+constexpr double kColumnGap = 0.1;    // in sides of a grid
+constexpr double kLabelText = 0.085;  // height of letters, in sides of a grid
+constexpr double kLabelBand = 0.15;   // above and below each grid, in sides of a grid
+
+// beyond these a grid shows blocks of cells, and no arrows or lines: bounds the size of messages
+constexpr int kMaxTiles = 64;
+constexpr int kMaxArrows = 32;
+
+// drawing order, bottom to top
+constexpr double kCellLayer = 0.0;
+constexpr double kArrowLayer = 0.1;
+constexpr double kPathLayer = 0.2;
+constexpr double kSymbolLayer = 0.3;
+constexpr double kTextLayer = 0.5;
+
+Color rgb(unsigned hex) {
+  Color color;
+  color.r = static_cast<float>((hex >> 16 & 255) / 255.0);
+  color.g = static_cast<float>((hex >> 8 & 255) / 255.0);
+  color.b = static_cast<float>((hex & 255) / 255.0);
+  color.a = 1;
+  return color;
+}
+
+Color mix(const Color& from, const Color& to, double share) {
+  const auto s = static_cast<float>(share);
+  Color color;
+  color.r = from.r + s * (to.r - from.r);
+  color.g = from.g + s * (to.g - from.g);
+  color.b = from.b + s * (to.b - from.b);
+  color.a = 1;
+  return color;
+}
+
+const Color kWhite = rgb(0xffffff);
+const Color kInk = rgb(0x222222);
+const Color kFaint = rgb(0x777777);
+const Color kLine = rgb(0xffffff);
+const Color kUnknown = rgb(0xd9d9d9);
+const Color kGold = rgb(0xffb000);
+const Color kPersonal = rgb(0xd81b60);
+const Color kMeta = rgb(0x0b4fb3);
+
+Color policyColor(int policy) { return policy == Trajectory::META ? kMeta : kPersonal; }
+
+/// Viridis (van der Walt and Smith), 0 to 1: lightness rises evenly, also for colour-blind eyes.
+Color viridis(double x) {
+  static const Color kAnchors[] = {rgb(0x440154), rgb(0x472d7b), rgb(0x3b528b),
+                                   rgb(0x2c728e), rgb(0x21918c), rgb(0x28ae80),
+                                   rgb(0x5ec962), rgb(0xaddc30), rgb(0xfde725)};
+  const double at = std::clamp(x, 0.0, 1.0) * 8;
+  const int i = std::min(static_cast<int>(at), 7);
+  return mix(kAnchors[i], kAnchors[i + 1], at - i);
+}
+
+double luminance(const Color& c) { return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b; }
+
+struct Point {
+  double x = 0;
+  double y = 0;
+};
+
+Marker makeMarker(const std::string& frame, const std::string& ns, int id) {
+  Marker marker;
+  marker.header.frame_id = frame;
+  marker.ns = ns;
+  marker.id = id;
+  marker.pose.orientation.w = 1;
+  return marker;
+}
+
+/// Flat figures as one marker of coloured triangles, which rviz draws without shading.
+class Figure {
+ public:
+  Figure(const std::string& frame, const std::string& ns, int id, double layer)
+      : marker_(makeMarker(frame, ns, id)), z_(layer) {
+    marker_.type = Marker::TRIANGLE_LIST;
+    marker_.scale.x = marker_.scale.y = marker_.scale.z = 1;
+    marker_.color = kWhite;
+  }
+
+  /// What follows is drawn above what was drawn so far.
+  void raise() { z_ += 0.01; }
+
+  /// A polygon all of whose corners can be seen from `centre`.
+  void polygon(const Point& centre, const std::vector<Point>& corners, const Color& color) {
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      triangle(centre, corners[i], corners[(i + 1) % corners.size()], color);
+    }
+  }
+
+  void rectangle(double left, double bottom, double right, double top, const Color& color) {
+    triangle({left, bottom}, {right, bottom}, {right, top}, color);
+    triangle({left, bottom}, {right, top}, {left, top}, color);
+  }
+
+  void disc(const Point& centre, double radius, const Color& color) {
+    std::vector<Point> rim;
+    for (int i = 0; i < 20; ++i) rim.push_back(polar(centre, radius, 2 * kPi * i / 20));
+    polygon(centre, rim, color);
+  }
+
+  /// A star of five points, one of them up.
+  void star(const Point& centre, double radius, const Color& color) {
+    std::vector<Point> rim;
+    for (int i = 0; i < 10; ++i) {
+      rim.push_back(polar(centre, i % 2 == 0 ? radius : 0.45 * radius, kPi / 2 + kPi * i / 5));
+    }
+    polygon(centre, rim, color);
+  }
+
+  void segment(const Point& from, const Point& to, double width, const Color& color) {
+    const double length = std::hypot(to.x - from.x, to.y - from.y);
+    if (length == 0) return;
+    const double dx = -(to.y - from.y) / length * width / 2;
+    const double dy = (to.x - from.x) / length * width / 2;
+    triangle({from.x + dx, from.y + dy}, {from.x - dx, from.y - dy}, {to.x - dx, to.y - dy}, color);
+    triangle({from.x + dx, from.y + dy}, {to.x - dx, to.y - dy}, {to.x + dx, to.y + dy}, color);
+  }
+
+  /// An x.
+  void cross(const Point& centre, double radius, double width, const Color& color) {
+    for (const double angle : {kPi / 4, 3 * kPi / 4}) {
+      segment(polar(centre, radius, angle), polar(centre, -radius, angle), width, color);
+    }
+  }
+
+  /// An arrow through `centre`, pointing where `angle` says.
+  void arrow(const Point& centre, double length, double angle, const Color& color) {
+    const Point tip = polar(centre, length / 2, angle);
+    const Point neck = polar(centre, 0.02 * length, angle);
+    segment(polar(centre, -length / 2, angle), neck, 0.16 * length, color);
+    triangle(polar(neck, 0.3 * length, angle + kPi / 2), polar(neck, -0.3 * length, angle + kPi / 2),
+             tip, color);
+  }
+
+  /// An empty figure deletes what stood in its place.
+  Marker take() {
+    marker_.action = marker_.points.empty() ? Marker::DELETE : Marker::ADD;
+    return std::move(marker_);
+  }
+
+ private:
+  static Point polar(const Point& centre, double radius, double angle) {
+    return {centre.x + radius * std::cos(angle), centre.y + radius * std::sin(angle)};
+  }
+
+  void triangle(const Point& a, const Point& b, const Point& c, const Color& color) {
+    for (const Point& corner : {a, b, c}) {
+      geometry_msgs::Point point;
+      point.x = corner.x;
+      point.y = corner.y;
+      point.z = z_;
+      marker_.points.push_back(point);
+      marker_.colors.push_back(color);
+    }
+  }
+
+  Marker marker_;
+  double z_;
+};
+
+/// Text centred at `at`, made smaller if it is wider than `width`; "" deletes it.
+Marker textMarker(const std::string& frame, const std::string& ns, int id, const Point& at,
+                  const std::string& text, double height, double width, const Color& color) {
+  constexpr double kLetterWidth = 0.5;  // of its height, on average
+  Marker marker = makeMarker(frame, ns, id);
+  marker.type = Marker::TEXT_VIEW_FACING;
+  marker.action = text.empty() ? Marker::DELETE : Marker::ADD;
+  marker.pose.position.x = at.x;
+  marker.pose.position.y = at.y;
+  marker.pose.position.z = kTextLayer;
+  marker.scale.z = std::min(height, width / (kLetterWidth * std::max<std::size_t>(text.size(), 1)));
+  marker.color = color;
+  marker.text = text;
+  return marker;
+}
+
+std::string number(double value) {
+  if (!std::isfinite(value)) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, std::abs(value) < 1e5 ? "%.2f" : "%.3g", value);
+  return text;
+}
+
+struct Cell {
+  int row = 0;
+  int column = 0;
+  bool operator==(const Cell& other) const { return row == other.row && column == other.column; }
+  bool operator<(const Cell& other) const {
+    return row != other.row ? row < other.row : column < other.column;
+  }
+};
+
+bool isLandmark(const GridGeometry& grid, int row, int column) {
+  return row == grid.task.landmark_row && column == grid.task.landmark_column;
+}
+
+/// One grid with what is known of one policy.
+struct GridPicture {
+  const GridGeometry& grid;
+  const PolicyView& view;
+  int policy;
+  std::string frame;
+  int id;
+  double side;
+
+  double cell() const { return side / grid.task.size; }
+  Point centre(const Cell& c) const { return {(c.column + 0.5) * cell(), -(c.row + 0.5) * cell()}; }
+  /// Sizes of symbols: shares of a cell, but never too small to see.
+  double symbol(double share) const { return share * std::max(cell(), side / 20); }
+};
+
+struct ValueRange {
+  double low = INFINITY;
+  double high = -INFINITY;
+};
+
+void extend(ValueRange& range, const PolicyView& view) {
+  if (!view.episode) return;
+  for (const double value : view.episode->state_values) {
+    if (!std::isfinite(value)) continue;
+    range.low = std::min(range.low, value);
+    range.high = std::max(range.high, value);
+  }
+}
+
+/// Mean value over a block of cells, NaN if none of them has one.
+double blockValue(const GridPicture& picture, int row, int column, int block) {
+  if (!picture.view.episode || picture.view.episode->state_values.empty()) return NAN;
+  double sum = 0;
+  int count = 0;
+  const int size = picture.grid.task.size;
+  for (int r = row; r < std::min(row + block, size); ++r) {
+    for (int c = column; c < std::min(column + block, size); ++c) {
+      const double value = picture.view.episode->state_values[r * picture.grid.stride + c];
+      if (!std::isfinite(value) || isLandmark(picture.grid, r, c)) continue;
+      sum += value;
+      ++count;
+    }
+  }
+  return count == 0 ? NAN : sum / count;
+}
+
+Color valueColor(double value, const ValueRange& range) {
+  if (!std::isfinite(value)) return kUnknown;
+  return viridis(range.high > range.low ? (value - range.low) / (range.high - range.low) : 0.5);
+}
+
+Marker drawCells(const GridPicture& picture, const ValueRange& range) {
+  const int size = picture.grid.task.size;
+  const int block = (size + kMaxTiles - 1) / kMaxTiles;
+  const double cell = picture.cell();
+  const double inset = size <= kMaxArrows ? 0.003 * picture.side : 0;
+
+  // cells leave a little of the ground free: the grid's lines
+  Figure figure(picture.frame, "cells", picture.id, kCellLayer);
+  const double border = 0.008 * picture.side;
+  figure.rectangle(-border, -picture.side - border, picture.side + border, border,
+                   policyColor(picture.policy));
+  figure.raise();
+  figure.rectangle(0, -picture.side, picture.side, 0, kLine);
+  figure.raise();
+  for (int row = 0; row < size; row += block) {
+    for (int column = 0; column < size; column += block) {
+      const Color color = block == 1 && isLandmark(picture.grid, row, column)
+                              ? kWhite
+                              : valueColor(blockValue(picture, row, column, block), range);
+      figure.rectangle(column * cell + inset, -std::min(row + block, size) * cell + inset,
+                       std::min(column + block, size) * cell - inset, -row * cell - inset, color);
+    }
+  }
+  return figure.take();
+}
+
+Marker drawArrows(const GridPicture& picture, const ValueRange& range) {
+  constexpr double kAngles[] = {kPi / 2, -kPi / 2, kPi, 0};  // up, down, left, right
+  Figure figure(picture.frame, "arrows", picture.id, kArrowLayer);
+  const int size = picture.grid.task.size;
+  const bool known = picture.view.episode && !picture.view.episode->greedy_actions.empty();
+  if (!known || size > kMaxArrows) return figure.take();
+  for (int row = 0; row < size; ++row) {
+    for (int column = 0; column < size; ++column) {
+      const int action = picture.view.episode->greedy_actions[row * picture.grid.stride + column];
+      if (action < 0 || isLandmark(picture.grid, row, column)) continue;
+      const Color ground = valueColor(blockValue(picture, row, column, 1), range);
+      const Color color = mix(ground, luminance(ground) > 0.5 ? kInk : kWhite, 0.75);
+      figure.arrow(picture.centre({row, column}), 0.55 * picture.cell(), kAngles[action], color);
+    }
+  }
+  return figure.take();
+}
+
+/// The cells of an episode, without standing still.
+std::vector<Cell> cellsOf(const Trajectory& episode) {
+  std::vector<Cell> cells;
+  for (std::size_t i = 0; i + 1 < episode.observations.size(); i += 2) {
+    const Cell cell{static_cast<int>(episode.observations[i]),
+                    static_cast<int>(episode.observations[i + 1])};
+    if (cells.empty() || !(cells.back() == cell)) cells.push_back(cell);
+  }
+  return cells;
+}
+
+Marker drawPath(const GridPicture& picture) {
+  Figure figure(picture.frame, "paths", picture.id, kPathLayer);
+  if (!picture.view.episode) return figure.take();
+  // each edge once: a policy that runs in circles does not make a longer message
+  const std::vector<Cell> cells = cellsOf(*picture.view.episode);
+  std::set<std::pair<Cell, Cell>> edges;
+  for (std::size_t i = 0; i + 1 < cells.size(); ++i) {
+    edges.insert(std::minmax(cells[i], cells[i + 1]));
+  }
+  const std::set<Cell> joints(cells.begin(), cells.end());
+
+  // a white rim sets the line off from any colour of cell
+  const std::pair<double, Color> strokes[] = {{picture.symbol(0.32), kWhite},
+                                              {picture.symbol(0.2), policyColor(picture.policy)}};
+  for (const auto& [width, color] : strokes) {
+    for (const auto& [from, to] : edges) {
+      figure.segment(picture.centre(from), picture.centre(to), width, color);
+    }
+    for (const Cell& joint : joints) figure.disc(picture.centre(joint), width / 2, color);
+    figure.raise();
+  }
+  return figure.take();
+}
+
+void drawStartSymbol(Figure& figure, const Point& at, double radius, const Color& color) {
+  figure.disc(at, radius, kWhite);
+  figure.raise();
+  figure.disc(at, 0.8 * radius, color);
+  figure.raise();
+  figure.disc(at, 0.4 * radius, kWhite);
+  figure.raise();
+}
+
+void drawEndSymbol(Figure& figure, const Point& at, double radius, const Color& color) {
+  figure.cross(at, 1.15 * radius, 0.6 * radius, kWhite);
+  figure.raise();
+  figure.cross(at, radius, 0.35 * radius, color);
+  figure.raise();
+}
+
+void drawLandmarkSymbol(Figure& figure, const Point& at, double radius) {
+  figure.star(at, radius, kInk);
+  figure.raise();
+  figure.star(at, 0.72 * radius, kGold);
+  figure.raise();
+}
+
+Marker drawLandmark(const GridPicture& picture) {
+  Figure figure(picture.frame, "landmarks", picture.id, kSymbolLayer);
+  const Cell landmark{picture.grid.task.landmark_row, picture.grid.task.landmark_column};
+  drawLandmarkSymbol(figure, picture.centre(landmark), picture.symbol(0.46));
+  return figure.take();
+}
+
+Marker drawEnds(const GridPicture& picture) {
+  Figure figure(picture.frame, "ends", picture.id, kSymbolLayer);
+  if (!picture.view.episode) return figure.take();
+  const std::vector<Cell> cells = cellsOf(*picture.view.episode);
+  const Color color = policyColor(picture.policy);
+  drawStartSymbol(figure, picture.centre(cells.front()), picture.symbol(0.34), color);
+  if (picture.view.episode->truncated) {
+    drawEndSymbol(figure, picture.centre(cells.back()), picture.symbol(0.36), color);
+  }
+  return figure.take();
+}
+
+/// Name and policy above the grid, round and return below it.
+void drawLabels(const GridPicture& picture, const std::string& below, MarkerArray& scene) {
+  const bool is_meta = picture.policy == Trajectory::META;
+  const double side = picture.side;
+  scene.markers.push_back(textMarker(picture.frame, "labels", picture.id,
+                                     {side / 2, kLabelBand / 2 * side},
+                                     picture.grid.name + (is_meta ? "  meta (MP)" : "  personal (PP)"),
+                                     kLabelText * side, side, policyColor(picture.policy)));
+  scene.markers.push_back(textMarker(picture.frame, "returns", picture.id,
+                                     {side / 2, -(1 + kLabelBand / 2) * side}, below,
+                                     kLabelText * side, side, kInk));
+}
+
+std::string resultText(const PolicyView& view, const SceneContent& content, bool is_meta) {
+  if (is_meta && !content.has_meta) return "no meta-policy here";
+  if (view.result) {
+    return "round " + std::to_string(view.result->round) + ", return " +
+           number(view.result->return_mean);
+  }
+  if (view.episode) {
+    return "round " + std::to_string(view.episode->round) + ", episode " +
+           number(view.episode->episode_return);
+  }
+  return "no round yet";
+}
+
+void drawTask(const GridGeometry& grid, int task, double side, const SceneContent& content,
+              MarkerArray& scene) {
+  const TaskView& views = content.tasks.at(task);
+  // one scale for both policies, so that their colours can be compared
+  ValueRange range;
+  extend(range, views.personal);
+  extend(range, views.meta);
+  for (const int policy : {Trajectory::PERSONAL, Trajectory::META}) {
+    const bool is_meta = policy == Trajectory::META;
+    const PolicyView& view = is_meta ? views.meta : views.personal;
+    const GridPicture picture{grid, view, policy, gridFrame(task, policy), 2 * task + is_meta, side};
+    scene.markers.push_back(drawCells(picture, range));
+    scene.markers.push_back(drawArrows(picture, range));
+    scene.markers.push_back(drawPath(picture));
+    scene.markers.push_back(drawLandmark(picture));
+    scene.markers.push_back(drawEnds(picture));
+    drawLabels(picture, resultText(view, content, is_meta), scene);
+  }
+}
+
+std::string stateText(const RoundSummary& summary) {
+  switch (summary.state) {
+    case RoundSummary::LATE:
+      return "  (waiting for late agents)";
+    case RoundSummary::FINISHED:
+      return "  (finished)";
+    case RoundSummary::STOPPED:
+      return "  (stopped)";
+    default:
+      return "";
+  }
+}
+
+void drawTitle(const SceneContent& content, MarkerArray& scene) {
+  std::string title = content.experiment + ":  ";
+  std::string personal;
+  std::string meta;
+  if (content.summary) {
+    title += "round " + std::to_string(content.summary->round) + " of " +
+             std::to_string(content.summary->rounds) + stateText(*content.summary);
+    personal = "mean personal return (PP)  " + number(content.summary->personal_return);
+    meta = "mean meta return (MP)  " + number(content.summary->meta_return);
+  } else {
+    title += "waiting for round 1 of " + std::to_string(content.rounds);
+  }
+  if (!content.has_trajectories) title += "  -  trajectories are switched off";
+
+  const double top = kSceneHeight / 2;
+  scene.markers.push_back(
+      textMarker(kWorldFrame, "title", 0, {0, top - 0.3}, title, 0.3, 11.5, kInk));
+  scene.markers.push_back(
+      textMarker(kWorldFrame, "title", 1, {-2.2, top - 0.72}, personal, 0.23, 4.2, kPersonal));
+  scene.markers.push_back(
+      textMarker(kWorldFrame, "title", 2, {2.2, top - 0.72}, meta, 0.23, 4.2, kMeta));
+}
+
+/// What the symbols mean, along the lower edge.
+void drawLegend(MarkerArray& scene) {
+  const double y = -kSceneHeight / 2 + kLegendHeight / 2;
+  const double r = 0.11;
+  Figure figure(kWorldFrame, "legend", 0, kSymbolLayer);
+  constexpr int kSteps = 32;
+  const double bar_left = -4.85;
+  const double bar_step = 1.6 / kSteps;
+  for (int i = 0; i < kSteps; ++i) {
+    figure.rectangle(bar_left + i * bar_step, y - 0.08, bar_left + (i + 1) * bar_step, y + 0.08,
+                     viridis((i + 0.5) / kSteps));
+  }
+  figure.arrow({-1.7, y}, 0.3, 0, kInk);
+  drawStartSymbol(figure, {0.25, y}, r, kInk);
+  drawLandmarkSymbol(figure, {1.35, y}, 1.4 * r);
+  drawEndSymbol(figure, {2.8, y}, r, kInk);
+  scene.markers.push_back(figure.take());
+
+  const std::pair<double, const char*> texts[] = {
+      {-5.35, "low value"},     {-2.72, "high value"}, {-0.8, "greedy action"},
+      {0.65, "start"},          {1.95, "landmark"},    {3.75, "out of time"}};
+  int id = 1;
+  for (const auto& [x, text] : texts) {
+    scene.markers.push_back(textMarker(kWorldFrame, "legend", id++, {x, y}, text, 0.17, 2, kFaint));
+  }
+}
+
+/// Columns and rows of tasks that make the grids as large as possible.
+struct Layout {
+  int columns = 1;
+  int rows = 1;
+  double side = 0;
+};
+
+Layout layoutGrids(int num_tasks) {
+  const double height = kSceneHeight - kTitleHeight - kLegendHeight;
+  Layout best;
+  for (int columns = 1; columns <= num_tasks; ++columns) {
+    const int rows = (num_tasks + columns - 1) / columns;
+    const double side = std::min(kSceneWidth / (columns * (1 + kColumnGap)),
+                                 height / (2 * rows * (1 + 2 * kLabelBand)));
+    if (side > best.side) best = {columns, rows, side};
+  }
+  return best;
+}
+
+}  // namespace
+
+std::string gridFrame(int task, int policy) {
+  return "task_" + std::to_string(task) + (policy == Trajectory::META ? "/meta" : "/personal");
+}
+
+double gridSide(int num_tasks) { return layoutGrids(num_tasks).side; }
+
+std::vector<geometry_msgs::TransformStamped> gridFrames(int num_tasks) {
+  const Layout layout = layoutGrids(num_tasks);
+  const double slot_width = kSceneWidth / layout.columns;
+  const double slot_height = (kSceneHeight - kTitleHeight - kLegendHeight) / (2 * layout.rows);
+  std::vector<geometry_msgs::TransformStamped> frames;
+  for (int task = 0; task < num_tasks; ++task) {
+    const int row = task / layout.columns;
+    const int in_row = std::min(layout.columns, num_tasks - row * layout.columns);
+    const double middle = (task % layout.columns - (in_row - 1) / 2.0) * slot_width;
+    for (const int policy : {Trajectory::PERSONAL, Trajectory::META}) {
+      const int slot = 2 * row + (policy == Trajectory::META);
+      geometry_msgs::TransformStamped frame;
+      frame.header.frame_id = kWorldFrame;
+      frame.child_frame_id = gridFrame(task, policy);
+      frame.transform.translation.x = middle - layout.side / 2;
+      frame.transform.translation.y =
+          kSceneHeight / 2 - kTitleHeight - (slot + 0.5) * slot_height + layout.side / 2;
+      frame.transform.rotation.w = 1;
+      frames.push_back(frame);
+    }
+  }
+  return frames;
+}
+
+std::string trajectoryProblem(const Trajectory& trajectory, const GridGeometry& grid) {
+  if (trajectory.policy != Trajectory::PERSONAL && trajectory.policy != Trajectory::META) {
+    return "policy " + std::to_string(trajectory.policy) + " is neither personal nor meta.";
+  }
+  if (trajectory.observation_size != 2 || trajectory.observations.size() < 2 ||
+      trajectory.observations.size() % 2 != 0) {
+    return "it has " + std::to_string(trajectory.observations.size()) + " observations of size " +
+           std::to_string(trajectory.observation_size) + "; a gridworld's are (row, column).";
+  }
+  const std::size_t steps = trajectory.observations.size() / 2 - 1;
+  if (trajectory.rewards.size() != steps ||
+      trajectory.actions.size() != steps * trajectory.action_size) {
+    return "it has " + std::to_string(trajectory.actions.size()) + " actions and " +
+           std::to_string(trajectory.rewards.size()) + " rewards for " + std::to_string(steps) +
+           " steps.";
+  }
+  const double last = grid.task.size - 1;
+  for (std::size_t i = 0; i < trajectory.observations.size(); ++i) {
+    // written so that NaN fails, too
+    const double at = trajectory.observations[i];
+    if (!(at >= 0 && at <= last && at == std::floor(at))) {
+      return "observation " + std::to_string(at) + " is not a cell of a grid with " +
+             std::to_string(grid.task.size) + " cells along each side.";
+    }
+    if (i % 2 == 1 && i > 2) {
+      const double moved = std::abs(at - trajectory.observations[i - 2]) +
+                           std::abs(trajectory.observations[i - 1] - trajectory.observations[i - 3]);
+      if (moved > 1) return "step " + std::to_string(i / 2) + " moves more than one cell.";
+    }
+  }
+  const std::size_t states = static_cast<std::size_t>(grid.stride) * grid.stride;
+  for (const std::size_t size :
+       {trajectory.state_values.size(), trajectory.greedy_actions.size()}) {
+    if (size != 0 && size != states) {
+      return "it has a table of " + std::to_string(size) + " states instead of " +
+             std::to_string(states) + ".";
+    }
+  }
+  for (const int action : trajectory.greedy_actions) {
+    if (action < -1 || action > 3) return "there is no action " + std::to_string(action) + ".";
+  }
+  return "";
+}
+
+MarkerArray gridworldScene(const std::vector<GridGeometry>& grids, const SceneContent& content) {
+  MarkerArray scene;
+  const double side = gridSide(static_cast<int>(grids.size()));
+  for (std::size_t task = 0; task < grids.size(); ++task) {
+    drawTask(grids[task], static_cast<int>(task), side, content, scene);
+  }
+  drawTitle(content, scene);
+  drawLegend(scene);
+  return scene;
+}
+
+}  // namespace pmeta_nodes

@@ -1,0 +1,273 @@
+#include "meta_aggregator_node.h"
+
+#include <pmeta_msgs/MetaPolicy.h>
+#include <ros/callback_queue.h>
+
+#include <cmath>
+
+#include "conversions.h"
+#include "node_main.h"
+#include "pmeta_core/base/error.h"
+
+namespace pmeta_nodes {
+namespace {
+
+using pmeta_msgs::RoundSummary;
+using Verdict = pmeta::MetaAggregator::Verdict;
+
+constexpr std::chrono::duration<double> kTick{0.02};
+constexpr auto kAnnounceEvery = std::chrono::seconds(5);
+// for the last messages to reach everybody before the node, and with it the launch, ends
+constexpr double kFarewell = 0.5;
+
+std::string shortNumber(double value) {
+  if (std::isnan(value)) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
+}
+
+}  // namespace
+
+MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool hold)
+    : experiment_(experiment),
+      hold_(hold),
+      aggregator_(experiment),
+      book_(experiment),
+      log_(experiment),
+      mailbox_(8 * static_cast<std::size_t>(experiment.numTasks()) + 16) {
+  summary_.run_id = experiment.settings().run_id;
+  summary_.experiment = experiment.settings().experiment;
+  summary_.rounds = static_cast<std::uint32_t>(experiment.settings().rounds);
+  summary_.personal_return = summary_.meta_return = std::nan("");
+
+  const auto queue = static_cast<std::uint32_t>(4 * experiment.numTasks() + 8);
+  const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+  meta_pub_ = nh_.advertise<pmeta_msgs::MetaPolicy>("meta_policy", 1, true);
+  round_pub_ = nh_.advertise<RoundSummary>("round", 8, true);
+  auxiliary_sub_ = nh_.subscribe<pmeta_msgs::AuxiliaryUpdate>(
+      "auxiliary", queue,
+      boost::function<void(const pmeta_msgs::AuxiliaryUpdate::ConstPtr&)>(
+          [this](const pmeta_msgs::AuxiliaryUpdate::ConstPtr& msg) { mailbox_.push(msg); }),
+      ros::VoidConstPtr(), hints);
+  returns_sub_ = nh_.subscribe<pmeta_msgs::TaskReturn>(
+      "returns", queue,
+      boost::function<void(const pmeta_msgs::TaskReturn::ConstPtr&)>(
+          [this](const pmeta_msgs::TaskReturn::ConstPtr& msg) { mailbox_.push(msg); }),
+      ros::VoidConstPtr(), hints);
+  health_ = std::make_unique<Health>(experiment.settings().experiment, "meta aggregator",
+                                     [this] { return health(); });
+  worker_ = std::thread([this] { work(); });
+}
+
+MetaAggregatorNode::~MetaAggregatorNode() {
+  stop_ = true;
+  mailbox_.close();
+  if (worker_.joinable()) worker_.join();
+}
+
+int MetaAggregatorNode::spin() {
+  bool told = false;
+  while (!stopRequested()) {
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
+    if (!done_) continue;
+    if (!hold_ || failed_) break;
+    if (!told) ROS_INFO("the run is over; holding the scene and topics until Ctrl-C.");
+    told = true;
+  }
+  stop_ = true;
+  mailbox_.close();
+  worker_.join();
+  return failed_ ? 1 : 0;
+}
+
+void MetaAggregatorNode::work() {
+  try {
+    runRounds();
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    failed_ = true;
+    try {
+      publishRound(RoundSummary::STOPPED, error.what());
+      log_.finish("failed");
+    } catch (const std::exception& second) {
+      ROS_FATAL("%s", second.what());
+    }
+  }
+  ros::WallDuration(kFarewell).sleep();
+  done_ = true;
+}
+
+void MetaAggregatorNode::runRounds() {
+  const int rounds = experiment_.settings().rounds;
+  ROS_INFO("run %s: %d tasks, %d rounds; results in %s", summary_.run_id.c_str(),
+           experiment_.numTasks(), rounds, log_.dir().c_str());
+  publishRound(RoundSummary::RUNNING, "waiting for the agents' first updates");
+  publishMetaPolicy();
+  while (!stop_ && book_.roundsTaken() < rounds) {
+    if (const auto message = mailbox_.pop(kTick)) take(*message);
+    writeCompleteRounds(false);
+    closeRoundIfDue();
+    announceLateness();
+  }
+  if (book_.roundsTaken() == rounds) {
+    log_.finish("finished");
+    publishRound(RoundSummary::FINISHED, "all rounds are done; results in " + log_.dir());
+    ROS_INFO("finished; results in %s", log_.dir().c_str());
+  } else {
+    writeCompleteRounds(true);
+    log_.finish("stopped");
+    publishRound(RoundSummary::STOPPED,
+                 "stopped in round " + std::to_string(aggregator_.metaPolicy().round + 1));
+    ROS_WARN("stopped in round %d; what was done is in %s", aggregator_.metaPolicy().round + 1,
+             log_.dir().c_str());
+  }
+}
+
+void MetaAggregatorNode::take(const Message& message) {
+  try {
+    if (const auto* update = std::get_if<pmeta_msgs::AuxiliaryUpdate::ConstPtr>(&message)) {
+      takeUpdate(**update);
+    } else {
+      takeReturn(*std::get<pmeta_msgs::TaskReturn::ConstPtr>(message));
+    }
+  } catch (const pmeta::Error& error) {
+    refuse(error.what());
+  }
+}
+
+void MetaAggregatorNode::takeUpdate(const pmeta_msgs::AuxiliaryUpdate& msg) {
+  // a foreign run's blob is not even unpacked
+  if (msg.run_id != summary_.run_id) {
+    return refuse("an update belongs to run '" + msg.run_id + "', not to '" + summary_.run_id +
+                  "'.");
+  }
+  const auto answer =
+      aggregator_.offer(std::make_shared<const pmeta::AuxiliaryUpdate>(fromMsg(msg)));
+  if (answer.verdict == Verdict::kRefused) refuse(answer.reason);
+}
+
+void MetaAggregatorNode::takeReturn(const pmeta_msgs::TaskReturn& msg) { book_.add(fromMsg(msg)); }
+
+void MetaAggregatorNode::refuse(const std::string& reason) {
+  ++summary_.refused;
+  ROS_WARN("refused: %s", reason.c_str());
+  publishRound(RoundSummary::RUNNING, "refused: " + reason);
+}
+
+double MetaAggregatorNode::roundSeconds() const {
+  return std::chrono::duration<double>(Clock::now() - round_start_).count();
+}
+
+void MetaAggregatorNode::closeRoundIfDue() {
+  const pmeta::ExperimentSettings& settings = experiment_.settings();
+  const int round = aggregator_.metaPolicy().round + 1;
+  const bool late = roundSeconds() > settings.aggregation.round_timeout &&
+                    experiment_.quorum() < experiment_.numTasks();
+  if (round > settings.rounds) {
+    // only returns of the last meta-policy are still out
+    if (late) writeCompleteRounds(true);
+    return;
+  }
+  if (roundSeconds() < settings.pace) return;
+  // a full round waits for the returns too: whoever is killed and comes back can still send them
+  const bool complete =
+      aggregator_.complete() && book_.roundsTaken() == round - 1 && book_.hasPersonal(round);
+  if (!complete && !(late && aggregator_.hasQuorum())) return;
+  const double seconds = roundSeconds();
+  writeCompleteRounds(true);
+  const std::vector<int> missing = aggregator_.closeRound();
+  if (!missing.empty()) {
+    ROS_WARN("round %d was closed by quorum without %s.", round, taskNames(missing).c_str());
+  }
+  book_.closeRound(round, aggregator_.metaPolicy().participants, missing, seconds);
+  publishMetaPolicy();
+}
+
+void MetaAggregatorNode::writeCompleteRounds(bool force) {
+  for (const pmeta::RoundBook::Round& round : book_.take(force)) {
+    log_.write(round);
+    const std::uint32_t refused = summary_.refused;
+    summary_ = toMsg(round.summary, experiment_);
+    summary_.refused = refused;
+    publishRound(RoundSummary::RUNNING,
+                 "round " + std::to_string(round.summary.round) + " is complete");
+    ROS_INFO("round %d/%d  PP %s  MP %s  %.2f s  ETA %.0f s", round.summary.round,
+             round.summary.rounds, shortNumber(round.summary.personal_return).c_str(),
+             shortNumber(round.summary.meta_return).c_str(), round.summary.seconds,
+             round.summary.eta_seconds);
+  }
+}
+
+void MetaAggregatorNode::publishMetaPolicy() {
+  auto msg = boost::make_shared<pmeta_msgs::MetaPolicy>(
+      toMsg(aggregator_.metaPolicy(), experiment_.settings().rounds));
+  msg->header.stamp = ros::Time::now();
+  meta_pub_.publish(boost::shared_ptr<const pmeta_msgs::MetaPolicy>(msg));
+  round_start_ = Clock::now();
+  next_announcement_ =
+      round_start_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+                         experiment_.settings().aggregation.round_timeout));
+}
+
+void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& message) {
+  summary_.state = state;
+  summary_.message = message;
+  summary_.header.stamp = ros::Time::now();
+  round_pub_.publish(summary_);
+
+  const std::lock_guard<std::mutex> lock(health_mutex_);
+  health_report_ = {};
+  health_report_.level = state == RoundSummary::LATE      ? HealthReport::kWarn
+                         : state == RoundSummary::STOPPED ? HealthReport::kError
+                                                          : HealthReport::kOk;
+  health_report_.summary = message;
+  health_report_.values = {{"rounds complete", std::to_string(summary_.round)},
+                           {"rounds in all", std::to_string(summary_.rounds)},
+                           {"refused", std::to_string(summary_.refused)}};
+  for (int task = 0; task < experiment_.numTasks(); ++task) {
+    const auto& counts = aggregator_.counts()[task];
+    health_report_.values.emplace_back(experiment_.family().taskName(task),
+                                       std::to_string(counts.accepted) + " accepted, " +
+                                           std::to_string(counts.duplicate) + " duplicate, " +
+                                           std::to_string(counts.stale) + " stale, " +
+                                           std::to_string(counts.refused) + " refused");
+  }
+}
+
+void MetaAggregatorNode::announceLateness() {
+  if (Clock::now() < next_announcement_) return;
+  next_announcement_ = Clock::now() + kAnnounceEvery;
+  // an update may be in and only a return missing
+  const std::vector<int> missing = aggregator_.complete() ? book_.awaited() : aggregator_.missing();
+  if (missing.empty()) return;
+  const int round = std::min(aggregator_.metaPolicy().round + 1, experiment_.settings().rounds);
+  const bool by_quorum = experiment_.quorum() < experiment_.numTasks();
+  const std::string message =
+      "round " + std::to_string(round) + " has waited " +
+      std::to_string(std::lround(roundSeconds())) + " s for " + taskNames(missing) +
+      (by_quorum ? "; it goes on once " + std::to_string(experiment_.quorum()) + " of " +
+                       std::to_string(experiment_.numTasks()) + " tasks have reported"
+                 : "; it goes on when they report");
+  const std::vector<std::uint32_t> of_last_round = summary_.missing;
+  summary_.missing.assign(missing.begin(), missing.end());
+  publishRound(RoundSummary::LATE, message);
+  summary_.missing = of_last_round;
+  ROS_WARN("%s", message.c_str());
+}
+
+std::string MetaAggregatorNode::taskNames(const std::vector<int>& tasks) const {
+  std::vector<std::string> names;
+  for (const int task : tasks) {
+    names.push_back("task " + std::to_string(task) + " (" + experiment_.family().taskName(task) +
+                    ")");
+  }
+  return pmeta::join(names);
+}
+
+HealthReport MetaAggregatorNode::health() {
+  const std::lock_guard<std::mutex> lock(health_mutex_);
+  return health_report_;
+}
+
+}  // namespace pmeta_nodes

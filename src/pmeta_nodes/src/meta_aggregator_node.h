@@ -1,0 +1,84 @@
+#pragma once
+
+#include <pmeta_msgs/AuxiliaryUpdate.h>
+#include <pmeta_msgs/RoundSummary.h>
+#include <pmeta_msgs/TaskReturn.h>
+#include <ros/ros.h>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "health.h"
+#include "mailbox.h"
+#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/run/meta_aggregator.h"
+#include "pmeta_core/run/run_log.h"
+
+namespace pmeta_nodes {
+
+/// A MetaAggregator on ROS: one worker thread owns the rounds, callbacks only hand messages to it.
+///
+/// Subscribes to auxiliary and returns; publishes meta_policy and round (both latched), and writes
+/// the run folder. A round is closed once every task's update and return are in, or, after
+/// round_timeout, once a quorum of updates is; while someone is missing `round` names who.
+class MetaAggregatorNode {
+ public:
+  /// Creates the run folder; throws pmeta::Error if that cannot be.
+  /// hold: stay after the last round, so that the scene and latched topics can be looked at.
+  MetaAggregatorNode(const pmeta::Experiment& experiment, bool hold);
+  ~MetaAggregatorNode();
+
+  /// Spins until the run has ended (and, with hold, the node is stopped). Returns the exit code.
+  int spin();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using Message =
+      std::variant<pmeta_msgs::AuxiliaryUpdate::ConstPtr, pmeta_msgs::TaskReturn::ConstPtr>;
+
+  void work();
+  void runRounds();
+  void take(const Message& message);
+  void takeUpdate(const pmeta_msgs::AuxiliaryUpdate& msg);
+  void takeReturn(const pmeta_msgs::TaskReturn& msg);
+  void refuse(const std::string& reason);
+  void closeRoundIfDue();
+  void writeCompleteRounds(bool force);
+  void publishMetaPolicy();
+  void publishRound(std::uint8_t state, const std::string& message);
+  void announceLateness();
+  std::string taskNames(const std::vector<int>& tasks) const;
+  double roundSeconds() const;
+  HealthReport health();
+
+  const pmeta::Experiment& experiment_;
+  const bool hold_;
+  pmeta::MetaAggregator aggregator_;  ///< the worker's, as are book_ and log_
+  pmeta::RoundBook book_;
+  pmeta::RunLog log_;
+  Clock::time_point round_start_;
+  Clock::time_point next_announcement_;
+  pmeta_msgs::RoundSummary summary_;  ///< of the last complete round
+
+  ros::NodeHandle nh_;
+  ros::Publisher meta_pub_;
+  ros::Publisher round_pub_;
+  ros::Subscriber auxiliary_sub_;
+  ros::Subscriber returns_sub_;
+  Mailbox<Message> mailbox_;
+
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> done_{false};
+  std::atomic<bool> failed_{false};
+  std::mutex health_mutex_;
+  HealthReport health_report_;
+  std::unique_ptr<Health> health_;
+  std::thread worker_;
+};
+
+}  // namespace pmeta_nodes

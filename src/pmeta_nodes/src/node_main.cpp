@@ -1,0 +1,60 @@
+#include "node_main.h"
+
+#include <atomic>
+#include <csignal>
+#include <cstring>
+#include <iostream>
+
+#include "pmeta_core/base/error.h"
+
+namespace pmeta_nodes {
+namespace {
+
+std::atomic<bool> g_stop{false};
+
+void onSignal(int) { g_stop = true; }
+
+}  // namespace
+
+int runNode(int argc, char** argv, const std::string& name, const std::string& help,
+            const std::function<int(const pmeta::Experiment&)>& body) {
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
+      std::cout << help;
+      return 0;
+    }
+  }
+  // our own handlers: the last words of a run are published before ROS goes down
+  ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
+  std::signal(SIGINT, onSignal);
+  std::signal(SIGTERM, onSignal);
+  try {
+    ros::NodeHandle nh;
+    const pmeta::Experiment experiment = readExperiment(nh, ros::NodeHandle("~"));
+    const int code = body(experiment);
+    ros::shutdown();
+    return code;
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    ros::shutdown();
+    return 1;
+  }
+}
+
+bool stopRequested() { return g_stop || !ros::ok(); }
+
+pmeta::Experiment readExperiment(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh) {
+  std::string file;
+  if (private_nh.getParam("config_file", file) && !file.empty()) {
+    return pmeta::Experiment::load(file);
+  }
+  std::string text;
+  if (!nh.getParam("config", text)) {
+    throw pmeta::Error("the parameter " + nh.resolveName("config") +
+                       " is not set: start with roslaunch pmeta_nodes gridworld.launch, or give "
+                       "_config_file:=FILE.");
+  }
+  return pmeta::Experiment::parse(text, "the parameter " + nh.resolveName("config"));
+}
+
+}  // namespace pmeta_nodes

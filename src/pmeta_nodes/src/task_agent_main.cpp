@@ -1,0 +1,36 @@
+#include "node_main.h"
+#include "pmeta_core/base/error.h"
+#include "task_agent_node.h"
+
+namespace {
+
+constexpr char kHelp[] =
+    R"(task_agent: trains the personalised policy of one task and sends auxiliary parameters.
+
+  rosrun pmeta_nodes task_agent _task:=0 __ns:=/pmeta
+
+private parameters
+  ~task         index of the task, from 0 (required)
+  ~config_file  settings file; by default the parameter `config` of the namespace is read
+subscribes   meta_policy, round
+publishes    auxiliary, returns, agent_status, task_<i>/trajectory, /diagnostics
+Normally started by roslaunch pmeta_nodes gridworld.launch, one process for each task.
+)";
+
+int runAgent(const pmeta::Experiment& experiment) {
+  int task = -1;
+  if (!ros::NodeHandle("~").getParam("task", task)) {
+    throw pmeta::Error("which task? Give the private parameter task, e.g. _task:=0.");
+  }
+  if (task < 0 || task >= experiment.numTasks()) {
+    throw pmeta::Error("task is " + std::to_string(task) + " but must be from 0 to " +
+                       std::to_string(experiment.numTasks() - 1) + ".");
+  }
+  return pmeta_nodes::TaskAgentNode(experiment, task).spin();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return pmeta_nodes::runNode(argc, argv, "task_agent", kHelp, runAgent);
+}

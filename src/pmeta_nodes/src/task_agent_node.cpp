@@ -1,0 +1,263 @@
+#include "task_agent_node.h"
+
+#include <ros/callback_queue.h>
+
+#include <algorithm>
+
+#include "conversions.h"
+#include "node_main.h"
+#include "pmeta_core/base/error.h"
+#include "pmeta_msgs/Trajectory.h"
+
+namespace pmeta_nodes {
+namespace {
+
+using pmeta_msgs::AgentStatus;
+
+constexpr auto kFirstResend = std::chrono::seconds(2);
+constexpr auto kLongestResend = std::chrono::seconds(30);
+// after the aggregator has left: time for roslaunch to stop us before we leave by ourselves, since
+// it would respawn an agent that ends first
+constexpr auto kFarewell = std::chrono::seconds(10);
+constexpr double kAggregatorWait = 5.0;
+
+const char* stateName(std::uint8_t state) {
+  switch (state) {
+    case AgentStatus::WAITING:
+      return "waiting";
+    case AgentStatus::TRAINING:
+      return "training";
+    case AgentStatus::EVALUATING:
+      return "evaluating";
+    case AgentStatus::DONE:
+      return "done";
+    case AgentStatus::FAILED:
+      return "failed";
+    default:
+      return "unknown";
+  }
+}
+
+}  // namespace
+
+TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task)
+    : experiment_(experiment), agent_(experiment, task) {
+  status_.run_id = experiment.settings().run_id;
+  status_.task = static_cast<std::uint32_t>(task);
+  status_.task_name = experiment.family().taskName(task);
+  status_.updates_per_round = static_cast<std::uint32_t>(experiment.settings().updates_per_round);
+
+  const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+  const std::string trajectory = "task_" + std::to_string(task) + "/trajectory";
+  auxiliary_pub_ = nh_.advertise<pmeta_msgs::AuxiliaryUpdate>("auxiliary", 4);
+  returns_pub_ = nh_.advertise<pmeta_msgs::TaskReturn>("returns", 16, true);
+  status_pub_ = nh_.advertise<AgentStatus>("agent_status", 4, true);
+  if (experiment.settings().publish_trajectories) {
+    trajectory_pub_ = nh_.advertise<pmeta_msgs::Trajectory>(trajectory, 4, true);
+  }
+  setState(AgentStatus::WAITING, "waiting for a meta-policy");
+  meta_sub_ = nh_.subscribe("meta_policy", 1, &TaskAgentNode::onMetaPolicy, this, hints);
+  round_sub_ = nh_.subscribe("round", 4, &TaskAgentNode::onRound, this, hints);
+  status_timer_ = nh_.createWallTimer(ros::WallDuration(1.0),
+                                      [this](const ros::WallTimerEvent&) { publishStatus(); });
+  resend_timer_ =
+      nh_.createWallTimer(ros::WallDuration(0.5), [this](const ros::WallTimerEvent&) { resend(); });
+  health_ = std::make_unique<Health>(status_.task_name, "task agent", [this] { return health(); });
+  trainer_ = std::thread([this] { train(); });
+}
+
+TaskAgentNode::~TaskAgentNode() {
+  stop_ = true;
+  mailbox_.close();
+  if (trainer_.joinable()) trainer_.join();
+}
+
+int TaskAgentNode::spin() {
+  ros::WallRate rate(100);
+  Clock::time_point alone_since = Clock::now();
+  while (!stopRequested() && !failed_) {
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
+    if (!run_ended_ || meta_sub_.getNumPublishers() > 0) alone_since = Clock::now();
+    if (Clock::now() - alone_since > kFarewell) break;
+  }
+  stop_ = true;
+  mailbox_.close();
+  trainer_.join();
+  return failed_ ? 1 : 0;
+}
+
+void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::ConstPtr& msg) {
+  if (msg->run_id != status_.run_id) {
+    ROS_WARN_THROTTLE(10, "ignoring a meta-policy of run '%s'; this agent belongs to '%s'.",
+                      msg->run_id.c_str(), status_.run_id.c_str());
+    return;
+  }
+  {
+    // a newer meta-policy shows that the aggregator has all we owed it for the rounds before
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const int round = static_cast<int>(msg->round);
+    if (round <= newest_round_) return;
+    newest_round_ = round;
+    const auto confirmed = [round](const auto& sent) {
+      return static_cast<int>(sent.round) <= round;
+    };
+    unconfirmed_updates_.erase(
+        std::remove_if(unconfirmed_updates_.begin(), unconfirmed_updates_.end(), confirmed),
+        unconfirmed_updates_.end());
+    unconfirmed_returns_.erase(
+        std::remove_if(unconfirmed_returns_.begin(), unconfirmed_returns_.end(), confirmed),
+        unconfirmed_returns_.end());
+  }
+  mailbox_.push(msg);
+}
+
+void TaskAgentNode::onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
+  if (msg->run_id != status_.run_id) return;
+  if (msg->state != pmeta_msgs::RoundSummary::FINISHED &&
+      msg->state != pmeta_msgs::RoundSummary::STOPPED) {
+    return;
+  }
+  run_ended_ = true;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  unconfirmed_returns_.clear();
+  unconfirmed_updates_.clear();
+}
+
+void TaskAgentNode::train() {
+  try {
+    while (!stop_) {
+      const auto msg = mailbox_.pop(std::chrono::seconds(1));
+      if (!msg) continue;
+      try {
+        trainFrom(fromMsg(**msg));
+      } catch (const pmeta::Error& error) {
+        // a meta-policy that does not fit is not trained on; a good one may still come
+        ROS_ERROR("%s", error.what());
+        setState(AgentStatus::WAITING, error.what());
+      }
+    }
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    setState(AgentStatus::FAILED, error.what());
+    failed_ = true;
+  }
+}
+
+void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
+  const int rounds = experiment_.settings().rounds;
+  waitForAggregator();
+  if (meta.round > 0 && experiment_.evaluatesMeta()) {
+    setState(AgentStatus::EVALUATING,
+             "evaluating the meta-policy of round " + std::to_string(meta.round));
+    deliver(agent_.evaluateMeta(meta));
+    if (trajectory_pub_) publishEpisode(agent_.recordMeta(meta), meta.round, pmeta::Policy::kMeta);
+  }
+  if (meta.round >= rounds) {
+    setState(AgentStatus::DONE, "all " + std::to_string(rounds) + " rounds are done");
+    return;
+  }
+
+  const int round = meta.round + 1;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_.round = static_cast<std::uint32_t>(round);
+    status_.update = 0;
+  }
+  setState(AgentStatus::TRAINING, "training round " + std::to_string(round));
+  const Clock::time_point start = Clock::now();
+  auto result = agent_.trainRound(meta, [this](int done) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_.update = static_cast<std::uint32_t>(done);
+    return !stop_;
+  });
+  if (!result) return;
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_.env_steps_per_s = static_cast<double>(result->personal.env_steps) / seconds;
+    status_.updates_per_s = static_cast<double>(result->personal.updates) / seconds;
+    status_.loss = result->loss;
+    status_.distance_to_meta = result->distance;
+  }
+  deliver(result->personal);
+  deliver(result->update);
+  if (trajectory_pub_) publishEpisode(agent_.recordPersonal(), round, pmeta::Policy::kPersonal);
+  setState(AgentStatus::WAITING, "waiting for the meta-policy of round " + std::to_string(round));
+}
+
+void TaskAgentNode::waitForAggregator() {
+  const ros::WallTime limit = ros::WallTime::now() + ros::WallDuration(kAggregatorWait);
+  while (!stop_ && ros::WallTime::now() < limit &&
+         (auxiliary_pub_.getNumSubscribers() == 0 || returns_pub_.getNumSubscribers() == 0)) {
+    ros::WallDuration(0.005).sleep();
+  }
+}
+
+void TaskAgentNode::deliver(const pmeta::TaskReturn& result) {
+  pmeta_msgs::TaskReturn msg = toMsg(result, status_.task_name);
+  msg.header.stamp = ros::Time::now();
+  returns_pub_.publish(msg);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  unconfirmed_returns_.push_back(std::move(msg));
+  resend_wait_ = kFirstResend;
+  next_resend_ = Clock::now() + resend_wait_;
+}
+
+void TaskAgentNode::deliver(const pmeta::AuxiliaryUpdate& update) {
+  pmeta_msgs::AuxiliaryUpdate msg = toMsg(update);
+  msg.header.stamp = ros::Time::now();
+  auxiliary_pub_.publish(msg);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  unconfirmed_updates_.push_back(std::move(msg));
+  resend_wait_ = kFirstResend;
+  next_resend_ = Clock::now() + resend_wait_;
+}
+
+void TaskAgentNode::publishEpisode(const pmeta::Episode& episode, int round, pmeta::Policy policy) {
+  pmeta_msgs::Trajectory msg = toMsg(episode, experiment_, agent_.task(), round, policy);
+  msg.header.stamp = ros::Time::now();
+  trajectory_pub_.publish(msg);
+}
+
+void TaskAgentNode::resend() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (unconfirmed_returns_.empty() && unconfirmed_updates_.empty()) return;
+  if (Clock::now() < next_resend_) return;
+  for (const auto& msg : unconfirmed_returns_) returns_pub_.publish(msg);
+  for (const auto& msg : unconfirmed_updates_) auxiliary_pub_.publish(msg);
+  // an aggregator that waits for others must not be flooded with large blobs
+  resend_wait_ = std::min<std::chrono::seconds>(2 * resend_wait_, kLongestResend);
+  next_resend_ = Clock::now() + resend_wait_;
+}
+
+void TaskAgentNode::setState(std::uint8_t state, const std::string& message) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_.state = state;
+    status_.message = message;
+  }
+  publishStatus();
+}
+
+void TaskAgentNode::publishStatus() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  status_.header.stamp = ros::Time::now();
+  status_pub_.publish(status_);
+}
+
+HealthReport TaskAgentNode::health() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  HealthReport report;
+  report.level = status_.state == AgentStatus::FAILED ? HealthReport::kError : HealthReport::kOk;
+  report.summary = std::string(stateName(status_.state)) + ": " + status_.message;
+  report.values = {{"round", std::to_string(status_.round)},
+                   {"updates/s", pmeta::formatNumber(status_.updates_per_s)},
+                   {"env steps/s", pmeta::formatNumber(status_.env_steps_per_s)},
+                   {"loss", pmeta::formatNumber(status_.loss)},
+                   {"distance to meta", pmeta::formatNumber(status_.distance_to_meta)},
+                   {"unconfirmed messages",
+                    std::to_string(unconfirmed_returns_.size() + unconfirmed_updates_.size())}};
+  return report;
+}
+
+}  // namespace pmeta_nodes

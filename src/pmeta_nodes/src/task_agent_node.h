@@ -1,0 +1,83 @@
+#pragma once
+
+#include <pmeta_msgs/AgentStatus.h>
+#include <pmeta_msgs/AuxiliaryUpdate.h>
+#include <pmeta_msgs/MetaPolicy.h>
+#include <pmeta_msgs/RoundSummary.h>
+#include <pmeta_msgs/TaskReturn.h>
+#include <ros/ros.h>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "health.h"
+#include "mailbox.h"
+#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/run/task_agent.h"
+
+namespace pmeta_nodes {
+
+/// A TaskAgent on ROS: a training thread fed with the newest meta-policy, and the topics around it.
+///
+/// Subscribes to meta_policy and round; publishes auxiliary, returns, agent_status and
+/// task_<i>/trajectory. What the aggregator must get is sent again until a newer meta-policy, or
+/// the end of the run, shows that it has it.
+class TaskAgentNode {
+ public:
+  TaskAgentNode(const pmeta::Experiment& experiment, int task);
+  ~TaskAgentNode();
+
+  /// Spins until stopped, or until some seconds after the run has ended. Returns the exit code.
+  int spin();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void onMetaPolicy(const pmeta_msgs::MetaPolicy::ConstPtr& msg);
+  void onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg);
+
+  void train();
+  void trainFrom(const pmeta::MetaPolicy& meta);
+  void waitForAggregator();
+  void deliver(const pmeta::TaskReturn& result);
+  void deliver(const pmeta::AuxiliaryUpdate& update);
+  void publishEpisode(const pmeta::Episode& episode, int round, pmeta::Policy policy);
+  void setState(std::uint8_t state, const std::string& message);
+  void publishStatus();
+  void resend();
+  HealthReport health();
+
+  const pmeta::Experiment& experiment_;
+  pmeta::TaskAgent agent_;
+  ros::NodeHandle nh_;
+  ros::Publisher auxiliary_pub_;
+  ros::Publisher returns_pub_;
+  ros::Publisher status_pub_;
+  ros::Publisher trajectory_pub_;
+  ros::Subscriber meta_sub_;
+  ros::Subscriber round_sub_;
+  ros::WallTimer status_timer_;
+  ros::WallTimer resend_timer_;
+
+  Mailbox<pmeta_msgs::MetaPolicy::ConstPtr> mailbox_{1};
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> failed_{false};
+  std::atomic<bool> run_ended_{false};
+
+  std::mutex mutex_;  ///< guards what follows
+  pmeta_msgs::AgentStatus status_;
+  std::vector<pmeta_msgs::TaskReturn> unconfirmed_returns_;
+  std::vector<pmeta_msgs::AuxiliaryUpdate> unconfirmed_updates_;
+  Clock::time_point next_resend_;
+  std::chrono::seconds resend_wait_{2};
+  int newest_round_ = -1;
+
+  std::unique_ptr<Health> health_;
+  std::thread trainer_;
+};
+
+}  // namespace pmeta_nodes
