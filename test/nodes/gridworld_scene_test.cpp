@@ -1,8 +1,9 @@
 #include "gridworld_scene.h"
 
-#include <boost/make_shared.hpp>
 #include <gtest/gtest.h>
+#include <boost/make_shared.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -102,7 +103,9 @@ std_msgs::ColorRGBA colorAt(const Marker& marker, double x, double y) {
   return color;
 }
 
-double luminance(const std_msgs::ColorRGBA& c) { return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b; }
+double luminance(const std_msgs::ColorRGBA& c) {
+  return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
+}
 
 TEST(GridworldScene, KeepsTheSameMarkersWhateverIsKnown) {
   const std::vector<GridGeometry> grids = {geometry(4), geometry(8)};
@@ -216,9 +219,9 @@ TEST(GridworldScene, PersonalAndMetaPathsDifferInColour) {
   const double x = gridSide(1) / 8;
   const auto personal = colorAt(find(markers, "paths", 0), x, -x);
   const auto meta = colorAt(find(markers, "paths", 1), x, -x);
-  EXPECT_GT(std::abs(personal.r - meta.r) + std::abs(personal.g - meta.g) +
-                std::abs(personal.b - meta.b),
-            0.5);
+  EXPECT_GT(
+      std::abs(personal.r - meta.r) + std::abs(personal.g - meta.g) + std::abs(personal.b - meta.b),
+      0.5);
 }
 
 TEST(GridworldScene, RunningInCirclesDoesNotMakeTheMessageLonger) {
@@ -284,7 +287,7 @@ TEST(GridworldScene, TextsSayRoundReturnsAndWhatIsMissing) {
   const auto text = [&](const std::string& ns, int id) {
     return find(gridworldScene(grids, scene), ns, id).text;
   };
-  EXPECT_EQ("gridworld:  waiting for round 1 of 10", text("title", 0));
+  EXPECT_EQ("gridworld: waiting for round 1 of 10", text("title", 0));
   EXPECT_EQ("no round yet", text("returns", 0));
 
   TaskReturn result;
@@ -297,14 +300,15 @@ TEST(GridworldScene, TextsSayRoundReturnsAndWhatIsMissing) {
   summary.personal_return = -2.25;
   summary.meta_return = kNan;
   scene.summary = boost::make_shared<RoundSummary>(summary);
-  EXPECT_EQ("gridworld:  round 7 of 10", text("title", 0));
-  EXPECT_EQ("mean personal return (PP)  -2.25", text("title", 1));
-  EXPECT_EQ("mean meta return (MP)  -", text("title", 2));
-  EXPECT_EQ("grid_4x4  meta (MP)", text("labels", 1));
+  EXPECT_EQ("gridworld: round 7 of 10", text("title", 0));
+  EXPECT_EQ("mean personal return (PP) -2.25", text("title", 1));
+  EXPECT_EQ("mean meta return (MP) -", text("title", 2));
+  EXPECT_EQ("grid_4x4 meta (MP)", text("labels", 1));
   EXPECT_EQ("round 7, return -3.50", text("returns", 1));
 
   scene.has_meta = false;
   EXPECT_EQ("no meta-policy here", text("returns", 1));
+  EXPECT_EQ("", text("title", 2));
   scene.has_trajectories = false;
   EXPECT_NE(std::string::npos, text("title", 0).find("trajectories are switched off"));
 }

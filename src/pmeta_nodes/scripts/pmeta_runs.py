@@ -8,13 +8,17 @@ return over the training tasks.
 import json
 import math
 import os
+import re
 import sys
 
 import numpy as np
 import yaml
 
 HEADER = "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s"
-CONVERGENCE_FILES = ("statements.csv", "gradient.csv", "contraction.csv", "distance.csv")
+CONVERGENCE_MARKS = ("statements.csv", "gradient.csv", "contraction.csv")
+CONVERGENCE_FILES = ("contraction.csv", "fixed_point.csv", "gradient.csv", "distance.csv")
+
+WORD_COLUMNS = ("diversity", "step", "update")
 
 # settings that name a run or pace it, and do not shape its result
 NAMES = {"experiment", "algorithm", "seed", "run_id", "results_dir", "pace", "publish_trajectories"}
@@ -22,7 +26,8 @@ NAMES = {"experiment", "algorithm", "seed", "run_id", "results_dir", "pace", "pu
 PROXIMAL = {"personal.lambda", "personal.eta", "personal.personal_init", "personal.proximal"}
 UNUSED = {
     "model_averaging": PROXIMAL,
-    "independent": PROXIMAL | {"aggregation.beta", "aggregation.quorum", "aggregation.round_timeout"},
+    "independent": PROXIMAL | {"aggregation.beta", "aggregation.quorum",
+                               "aggregation.round_timeout"},
 }
 DEFAULTS = {"personal.lambda": 10, "personal.personal_init": "meta"}
 ALGORITHMS = {"pmeta": "pMeta-RL", "model_averaging": "model averaging",
@@ -48,7 +53,7 @@ def find_folders(dirs):
             raise PlotError("there is no folder %s." % top)
         for folder, subfolders, files in os.walk(top, onerror=_refuse):
             subfolders.sort()
-            if any(name in files for name in CONVERGENCE_FILES):
+            if any(name in files for name in CONVERGENCE_MARKS):
                 convergence.setdefault(os.path.realpath(folder), folder)
             elif "manifest.json" in files and "rounds.csv" in files:
                 runs.setdefault(os.path.realpath(folder), folder)
@@ -70,6 +75,9 @@ class Run:
         self.settings = _flatten(config)
         self.experiment = str(_required(folder, manifest, "experiment", str))
         self.algorithm = str(_required(folder, manifest, "algorithm", str))
+        if not re.match(r"[\w.+-]*\w", self.experiment) or os.sep in self.experiment:
+            raise PlotError("%s/manifest.json: experiment is '%s' but must be a plain name."
+                            % (folder, self.experiment))
         self.seed = _required(folder, manifest, "seed", int)
         self.num_rounds = _required(folder, manifest, "rounds", int)
         self.started = str(manifest.get("started") or "")
@@ -104,20 +112,62 @@ def load_runs(folders):
     """Reads the finished runs and names those left out; throws PlotError."""
     runs = []
     for folder in folders:
-        path = os.path.join(folder, "manifest.json")
-        try:
-            manifest = json.loads(read_text(path))
-        except ValueError as error:
-            raise PlotError("%s is not valid JSON: %s." % (path, error))
-        if not isinstance(manifest, dict):
-            raise PlotError("%s must hold a JSON object." % path)
-        status = manifest.get("status")
-        if status == "finished":
+        manifest = _finished_manifest(folder)
+        if manifest is not None:
             runs.append(Run(folder, manifest))
-        else:
-            warn("%s is left out: its status is '%s' (%s of %s rounds), not 'finished'."
-                 % (folder, status, manifest.get("rounds_done", "?"), manifest.get("rounds", "?")))
     return runs
+
+
+def load_convergence(folders):
+    """{folder: {file name: {column: array}}} of the finished convergence runs; throws PlotError."""
+    found = {}
+    for folder in folders:
+        if not os.path.isfile(os.path.join(folder, "manifest.json")):
+            warn("%s is left out: it has no manifest.json, so it has not finished." % folder)
+        elif _finished_manifest(folder) is not None:
+            found[folder] = {name: read_columns(os.path.join(folder, name))
+                             for name in CONVERGENCE_FILES
+                             if os.path.isfile(os.path.join(folder, name))}
+    return found
+
+
+def _finished_manifest(folder):
+    """The manifest, or None and a warning if the run has not finished."""
+    path = os.path.join(folder, "manifest.json")
+    try:
+        manifest = json.loads(read_text(path))
+    except ValueError as error:
+        raise PlotError("%s is not valid JSON: %s." % (path, error))
+    if not isinstance(manifest, dict):
+        raise PlotError("%s must hold a JSON object." % path)
+    if manifest.get("status") == "finished":
+        return manifest
+    warn("%s is left out: its status is '%s' (%s of %s rounds), not 'finished'."
+         % (folder, manifest.get("status"), manifest.get("rounds_done", "?"),
+            manifest.get("rounds", "?")))
+    return None
+
+
+def read_columns(path):
+    """{column: values} of a convergence file: words, or floats where NaN is fair."""
+    header = tuple(read_text(path).split("\n", 1)[0].split(","))
+    columns = {name: [] for name in header}
+    for number, fields in read_csv(path):
+        for name, text in zip(header, fields):
+            if name not in WORD_COLUMNS:
+                try:
+                    text = float(text)
+                except ValueError:
+                    raise PlotError("%s line %d: %s is '%s', not a number."
+                                    % (path, number, name, text))
+            columns[name].append(text)
+    return {name: np.array(values) for name, values in columns.items()}
+
+
+def require_columns(path, columns, names):
+    for name in names:
+        if name not in columns:
+            raise PlotError("%s line 1: the column '%s' is missing." % (path, name))
 
 
 def read_rounds(path):
@@ -304,6 +354,10 @@ def group_runs(runs):
                                    g.algorithm, [sort_key(g.settings.get(k)) for k in keys]))
         for group in groups:
             group.label = " ".join([group.label] + setting_texts(group, keys))
+            commits = sorted(set(run.commit for run in group.runs))
+            if len(commits) > 1:
+                warn("the runs of %s, %s, come from %d versions of the code: %s."
+                     % (experiment, group.label, len(commits), ", ".join(commits)))
         experiments[experiment] = groups
     return experiments
 

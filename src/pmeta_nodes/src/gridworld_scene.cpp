@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <set>
 #include <utility>
 
@@ -22,9 +21,10 @@ constexpr double kPi = 3.14159265358979323846;
 // scene bands, from the top: title, grids, legend
 constexpr double kTitleHeight = 1.05;
 constexpr double kLegendHeight = 0.55;
-constexpr double kColumnGap = 0.1;    // in sides of a grid
-constexpr double kLabelText = 0.085;  // height of letters, in sides of a grid
-constexpr double kLabelBand = 0.15;   // above and below each grid, in sides of a grid
+constexpr double kColumnGap = 0.1;        // in sides of a grid
+constexpr double kLabelBand = 0.15;       // above and below each grid, in sides of a grid
+constexpr double kLeastLabelBand = 0.22;  // so that labels of many small grids can be read
+constexpr double kLetterShare = 0.57;     // height of letters, in label bands
 
 // beyond these a grid shows blocks of cells, and no arrows or lines: bounds the size of messages
 constexpr int kMaxTiles = 64;
@@ -34,6 +34,7 @@ constexpr int kMaxArrows = 32;
 constexpr double kCellLayer = 0.0;
 constexpr double kArrowLayer = 0.1;
 constexpr double kPathLayer = 0.2;
+constexpr double kHeadLayer = 0.25;
 constexpr double kSymbolLayer = 0.3;
 constexpr double kTextLayer = 0.5;
 
@@ -79,6 +80,34 @@ Color viridis(double x) {
 
 double luminance(const Color& c) { return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b; }
 
+/// Columns and rows of tasks that make the grids as large as possible.
+struct Layout {
+  int columns = 1;
+  int rows = 1;
+  double slot_width = 0;
+  double slot_height = 0;  ///< of one grid with its labels
+  double side = 0;
+  double label_band = 0;
+};
+
+Layout layoutGrids(int num_tasks) {
+  Layout best;
+  for (int columns = 1; columns <= num_tasks; ++columns) {
+    Layout layout;
+    layout.columns = columns;
+    layout.rows = (num_tasks + columns - 1) / columns;
+    layout.slot_width = kSceneWidth / columns;
+    layout.slot_height = (kSceneHeight - kTitleHeight - kLegendHeight) / (2 * layout.rows);
+    const double least_band = std::min(kLeastLabelBand, layout.slot_height / 4);
+    layout.side =
+        std::min({layout.slot_width / (1 + kColumnGap), layout.slot_height / (1 + 2 * kLabelBand),
+                  layout.slot_height - 2 * least_band});
+    layout.label_band = std::max(least_band, kLabelBand * layout.side);
+    if (layout.side > best.side) best = layout;
+  }
+  return best;
+}
+
 struct Point {
   double x = 0;
   double y = 0;
@@ -105,6 +134,7 @@ class Figure {
 
   /// What follows is drawn above what was drawn so far.
   void raise() { z_ += 0.01; }
+  void moveTo(double layer) { z_ = layer; }
 
   /// A polygon all of whose corners can be seen from `centre`.
   void polygon(const Point& centre, const std::vector<Point>& corners, const Color& color) {
@@ -154,8 +184,15 @@ class Figure {
     const Point tip = polar(centre, length / 2, angle);
     const Point neck = polar(centre, 0.02 * length, angle);
     segment(polar(centre, -length / 2, angle), neck, 0.16 * length, color);
-    triangle(polar(neck, 0.3 * length, angle + kPi / 2), polar(neck, -0.3 * length, angle + kPi / 2),
-             tip, color);
+    triangle(polar(neck, 0.3 * length, angle + kPi / 2),
+             polar(neck, -0.3 * length, angle + kPi / 2), tip, color);
+  }
+
+  /// Only the head of an arrow.
+  void head(const Point& centre, double length, double angle, const Color& color) {
+    const Point foot = polar(centre, -length / 2, angle);
+    triangle(polar(foot, length / 2, angle + kPi / 2), polar(foot, -length / 2, angle + kPi / 2),
+             polar(centre, length / 2, angle), color);
   }
 
   /// An empty figure deletes what stood in its place.
@@ -227,12 +264,13 @@ struct GridPicture {
   int policy;
   std::string frame;
   int id;
-  double side;
+  const Layout& layout;
+  double side = layout.side;
 
   double cell() const { return side / grid.task.size; }
   Point centre(const Cell& c) const { return {(c.column + 0.5) * cell(), -(c.row + 0.5) * cell()}; }
   /// Sizes of symbols: shares of a cell, but never too small to see.
-  double symbol(double share) const { return share * std::max(cell(), side / 20); }
+  double symbol(double share) const { return share * std::max(cell(), side / 14); }
 };
 
 struct ValueRange {
@@ -297,40 +335,50 @@ Marker drawCells(const GridPicture& picture, const ValueRange& range) {
   return figure.take();
 }
 
+/// The cells of an episode, without standing still.
+std::vector<Cell> cellsOf(const PolicyView& view) {
+  std::vector<Cell> cells;
+  if (!view.episode) return cells;
+  const std::vector<double>& observations = view.episode->observations;
+  for (std::size_t i = 0; i + 1 < observations.size(); i += 2) {
+    const Cell cell{static_cast<int>(observations[i]), static_cast<int>(observations[i + 1])};
+    if (cells.empty() || !(cells.back() == cell)) cells.push_back(cell);
+  }
+  return cells;
+}
+
+/// Greedy actions: arrows in the cells, and white heads on the path.
 Marker drawArrows(const GridPicture& picture, const ValueRange& range) {
   constexpr double kAngles[] = {kPi / 2, -kPi / 2, kPi, 0};  // up, down, left, right
   Figure figure(picture.frame, "arrows", picture.id, kArrowLayer);
   const int size = picture.grid.task.size;
   const bool known = picture.view.episode && !picture.view.episode->greedy_actions.empty();
   if (!known || size > kMaxArrows) return figure.take();
+  const std::vector<Cell> path = cellsOf(picture.view);
+  const std::set<Cell> visited(path.begin(), path.end());
   for (int row = 0; row < size; ++row) {
     for (int column = 0; column < size; ++column) {
       const int action = picture.view.episode->greedy_actions[row * picture.grid.stride + column];
       if (action < 0 || isLandmark(picture.grid, row, column)) continue;
+      const Point centre = picture.centre({row, column});
+      if (visited.count({row, column}) != 0) {
+        figure.moveTo(kHeadLayer);
+        figure.head(centre, 0.17 * picture.cell(), kAngles[action], kWhite);
+        continue;
+      }
       const Color ground = valueColor(blockValue(picture, row, column, 1), range);
       const Color color = mix(ground, luminance(ground) > 0.5 ? kInk : kWhite, 0.75);
-      figure.arrow(picture.centre({row, column}), 0.55 * picture.cell(), kAngles[action], color);
+      figure.moveTo(kArrowLayer);
+      figure.arrow(centre, 0.55 * picture.cell(), kAngles[action], color);
     }
   }
   return figure.take();
 }
 
-/// The cells of an episode, without standing still.
-std::vector<Cell> cellsOf(const Trajectory& episode) {
-  std::vector<Cell> cells;
-  for (std::size_t i = 0; i + 1 < episode.observations.size(); i += 2) {
-    const Cell cell{static_cast<int>(episode.observations[i]),
-                    static_cast<int>(episode.observations[i + 1])};
-    if (cells.empty() || !(cells.back() == cell)) cells.push_back(cell);
-  }
-  return cells;
-}
-
 Marker drawPath(const GridPicture& picture) {
   Figure figure(picture.frame, "paths", picture.id, kPathLayer);
-  if (!picture.view.episode) return figure.take();
   // each edge once: a policy that runs in circles does not make a longer message
-  const std::vector<Cell> cells = cellsOf(*picture.view.episode);
+  const std::vector<Cell> cells = cellsOf(picture.view);
   std::set<std::pair<Cell, Cell>> edges;
   for (std::size_t i = 0; i + 1 < cells.size(); ++i) {
     edges.insert(std::minmax(cells[i], cells[i + 1]));
@@ -338,8 +386,8 @@ Marker drawPath(const GridPicture& picture) {
   const std::set<Cell> joints(cells.begin(), cells.end());
 
   // a white rim sets the line off from any colour of cell
-  const std::pair<double, Color> strokes[] = {{picture.symbol(0.32), kWhite},
-                                              {picture.symbol(0.2), policyColor(picture.policy)}};
+  const std::pair<double, Color> strokes[] = {{picture.symbol(0.36), kWhite},
+                                              {picture.symbol(0.24), policyColor(picture.policy)}};
   for (const auto& [width, color] : strokes) {
     for (const auto& [from, to] : edges) {
       figure.segment(picture.centre(from), picture.centre(to), width, color);
@@ -382,8 +430,8 @@ Marker drawLandmark(const GridPicture& picture) {
 
 Marker drawEnds(const GridPicture& picture) {
   Figure figure(picture.frame, "ends", picture.id, kSymbolLayer);
-  if (!picture.view.episode) return figure.take();
-  const std::vector<Cell> cells = cellsOf(*picture.view.episode);
+  const std::vector<Cell> cells = cellsOf(picture.view);
+  if (cells.empty()) return figure.take();
   const Color color = policyColor(picture.policy);
   drawStartSymbol(figure, picture.centre(cells.front()), picture.symbol(0.34), color);
   if (picture.view.episode->truncated) {
@@ -395,14 +443,16 @@ Marker drawEnds(const GridPicture& picture) {
 /// Name and policy above the grid, round and return below it.
 void drawLabels(const GridPicture& picture, const std::string& below, MarkerArray& scene) {
   const bool is_meta = picture.policy == Trajectory::META;
-  const double side = picture.side;
-  scene.markers.push_back(textMarker(picture.frame, "labels", picture.id,
-                                     {side / 2, kLabelBand / 2 * side},
-                                     picture.grid.name + (is_meta ? "  meta (MP)" : "  personal (PP)"),
-                                     kLabelText * side, side, policyColor(picture.policy)));
+  const std::string above = picture.grid.name + (is_meta ? " meta (MP)" : " personal (PP)");
+  const double middle = picture.side / 2;
+  const double band = picture.layout.label_band;
+  const double height = kLetterShare * band;
+  const double width = 0.95 * picture.layout.slot_width;
+  scene.markers.push_back(textMarker(picture.frame, "labels", picture.id, {middle, band / 2}, above,
+                                     height, width, policyColor(picture.policy)));
   scene.markers.push_back(textMarker(picture.frame, "returns", picture.id,
-                                     {side / 2, -(1 + kLabelBand / 2) * side}, below,
-                                     kLabelText * side, side, kInk));
+                                     {middle, -picture.side - band / 2}, below, height, width,
+                                     kInk));
 }
 
 std::string resultText(const PolicyView& view, const SceneContent& content, bool is_meta) {
@@ -418,7 +468,7 @@ std::string resultText(const PolicyView& view, const SceneContent& content, bool
   return "no round yet";
 }
 
-void drawTask(const GridGeometry& grid, int task, double side, const SceneContent& content,
+void drawTask(const GridGeometry& grid, int task, const Layout& layout, const SceneContent& content,
               MarkerArray& scene) {
   const TaskView& views = content.tasks.at(task);
   // one scale for both policies, so that their colours can be compared
@@ -428,7 +478,8 @@ void drawTask(const GridGeometry& grid, int task, double side, const SceneConten
   for (const int policy : {Trajectory::PERSONAL, Trajectory::META}) {
     const bool is_meta = policy == Trajectory::META;
     const PolicyView& view = is_meta ? views.meta : views.personal;
-    const GridPicture picture{grid, view, policy, gridFrame(task, policy), 2 * task + is_meta, side};
+    const GridPicture picture{grid,  view, policy, gridFrame(task, policy), 2 * task + is_meta,
+                              layout};
     scene.markers.push_back(drawCells(picture, range));
     scene.markers.push_back(drawArrows(picture, range));
     scene.markers.push_back(drawPath(picture));
@@ -441,29 +492,29 @@ void drawTask(const GridGeometry& grid, int task, double side, const SceneConten
 std::string stateText(const RoundSummary& summary) {
   switch (summary.state) {
     case RoundSummary::LATE:
-      return "  (waiting for late agents)";
+      return " (waiting for late agents)";
     case RoundSummary::FINISHED:
-      return "  (finished)";
+      return " (finished)";
     case RoundSummary::STOPPED:
-      return "  (stopped)";
+      return " (stopped)";
     default:
       return "";
   }
 }
 
 void drawTitle(const SceneContent& content, MarkerArray& scene) {
-  std::string title = content.experiment + ":  ";
+  std::string title = content.experiment + ": ";
   std::string personal;
   std::string meta;
   if (content.summary) {
     title += "round " + std::to_string(content.summary->round) + " of " +
              std::to_string(content.summary->rounds) + stateText(*content.summary);
-    personal = "mean personal return (PP)  " + number(content.summary->personal_return);
-    meta = "mean meta return (MP)  " + number(content.summary->meta_return);
+    personal = "mean personal return (PP) " + number(content.summary->personal_return);
+    if (content.has_meta) meta = "mean meta return (MP) " + number(content.summary->meta_return);
   } else {
     title += "waiting for round 1 of " + std::to_string(content.rounds);
   }
-  if (!content.has_trajectories) title += "  -  trajectories are switched off";
+  if (!content.has_trajectories) title += " - trajectories are switched off";
 
   const double top = kSceneHeight / 2;
   scene.markers.push_back(
@@ -480,44 +531,25 @@ void drawLegend(MarkerArray& scene) {
   const double r = 0.11;
   Figure figure(kWorldFrame, "legend", 0, kSymbolLayer);
   constexpr int kSteps = 32;
-  const double bar_left = -4.85;
+  const double bar_left = -3.67;
   const double bar_step = 1.6 / kSteps;
   for (int i = 0; i < kSteps; ++i) {
     figure.rectangle(bar_left + i * bar_step, y - 0.08, bar_left + (i + 1) * bar_step, y + 0.08,
                      viridis((i + 0.5) / kSteps));
   }
-  figure.arrow({-1.7, y}, 0.3, 0, kInk);
-  drawStartSymbol(figure, {0.25, y}, r, kInk);
-  drawLandmarkSymbol(figure, {1.35, y}, 1.4 * r);
-  drawEndSymbol(figure, {2.8, y}, r, kInk);
+  figure.arrow({-0.67, y}, 0.3, 0, kInk);
+  drawStartSymbol(figure, {1.01, y}, r, kInk);
+  drawLandmarkSymbol(figure, {2.15, y}, 1.4 * r);
+  drawEndSymbol(figure, {3.48, y}, r, kInk);
   scene.markers.push_back(figure.take());
 
-  const std::pair<double, const char*> texts[] = {
-      {-5.35, "low value"},     {-2.72, "high value"}, {-0.8, "greedy action"},
-      {0.65, "start"},          {1.95, "landmark"},    {3.75, "out of time"}};
+  const std::pair<double, const char*> texts[] = {{-4.12, "low value"},    {-1.59, "high value"},
+                                                  {0.04, "greedy action"}, {1.41, "start"},
+                                                  {2.67, "landmark"},      {4.06, "out of time"}};
   int id = 1;
   for (const auto& [x, text] : texts) {
     scene.markers.push_back(textMarker(kWorldFrame, "legend", id++, {x, y}, text, 0.17, 2, kFaint));
   }
-}
-
-/// Columns and rows of tasks that make the grids as large as possible.
-struct Layout {
-  int columns = 1;
-  int rows = 1;
-  double side = 0;
-};
-
-Layout layoutGrids(int num_tasks) {
-  const double height = kSceneHeight - kTitleHeight - kLegendHeight;
-  Layout best;
-  for (int columns = 1; columns <= num_tasks; ++columns) {
-    const int rows = (num_tasks + columns - 1) / columns;
-    const double side = std::min(kSceneWidth / (columns * (1 + kColumnGap)),
-                                 height / (2 * rows * (1 + 2 * kLabelBand)));
-    if (side > best.side) best = {columns, rows, side};
-  }
-  return best;
 }
 
 }  // namespace
@@ -530,13 +562,11 @@ double gridSide(int num_tasks) { return layoutGrids(num_tasks).side; }
 
 std::vector<geometry_msgs::TransformStamped> gridFrames(int num_tasks) {
   const Layout layout = layoutGrids(num_tasks);
-  const double slot_width = kSceneWidth / layout.columns;
-  const double slot_height = (kSceneHeight - kTitleHeight - kLegendHeight) / (2 * layout.rows);
   std::vector<geometry_msgs::TransformStamped> frames;
   for (int task = 0; task < num_tasks; ++task) {
     const int row = task / layout.columns;
     const int in_row = std::min(layout.columns, num_tasks - row * layout.columns);
-    const double middle = (task % layout.columns - (in_row - 1) / 2.0) * slot_width;
+    const double middle = (task % layout.columns - (in_row - 1) / 2.0) * layout.slot_width;
     for (const int policy : {Trajectory::PERSONAL, Trajectory::META}) {
       const int slot = 2 * row + (policy == Trajectory::META);
       geometry_msgs::TransformStamped frame;
@@ -544,7 +574,7 @@ std::vector<geometry_msgs::TransformStamped> gridFrames(int num_tasks) {
       frame.child_frame_id = gridFrame(task, policy);
       frame.transform.translation.x = middle - layout.side / 2;
       frame.transform.translation.y =
-          kSceneHeight / 2 - kTitleHeight - (slot + 0.5) * slot_height + layout.side / 2;
+          kSceneHeight / 2 - kTitleHeight - (slot + 0.5) * layout.slot_height + layout.side / 2;
       frame.transform.rotation.w = 1;
       frames.push_back(frame);
     }
@@ -577,8 +607,9 @@ std::string trajectoryProblem(const Trajectory& trajectory, const GridGeometry& 
              std::to_string(grid.task.size) + " cells along each side.";
     }
     if (i % 2 == 1 && i > 2) {
-      const double moved = std::abs(at - trajectory.observations[i - 2]) +
-                           std::abs(trajectory.observations[i - 1] - trajectory.observations[i - 3]);
+      const double moved =
+          std::abs(at - trajectory.observations[i - 2]) +
+          std::abs(trajectory.observations[i - 1] - trajectory.observations[i - 3]);
       if (moved > 1) return "step " + std::to_string(i / 2) + " moves more than one cell.";
     }
   }
@@ -598,9 +629,9 @@ std::string trajectoryProblem(const Trajectory& trajectory, const GridGeometry& 
 
 MarkerArray gridworldScene(const std::vector<GridGeometry>& grids, const SceneContent& content) {
   MarkerArray scene;
-  const double side = gridSide(static_cast<int>(grids.size()));
+  const Layout layout = layoutGrids(static_cast<int>(grids.size()));
   for (std::size_t task = 0; task < grids.size(); ++task) {
-    drawTask(grids[task], static_cast<int>(task), side, content, scene);
+    drawTask(grids[task], static_cast<int>(task), layout, content, scene);
   }
   drawTitle(content, scene);
   drawLegend(scene);

@@ -35,10 +35,10 @@ struct TaskView {
 /// All that the scene shows.
 struct SceneContent {
   std::string experiment;
-  int rounds = 0;                 ///< C
-  bool has_trajectories = true;   ///< false: agents send none, and the title says so
-  bool has_meta = true;           ///< false: independent training, the lower row says so
-  std::vector<TaskView> tasks;    ///< one for each grid
+  int rounds = 0;                ///< C
+  bool has_trajectories = true;  ///< false: agents send none, and the title says so
+  bool has_meta = true;          ///< false: independent training, the lower row says so
+  std::vector<TaskView> tasks;   ///< one for each grid
   pmeta_msgs::RoundSummary::ConstPtr summary;  ///< null: no round yet
 };
 

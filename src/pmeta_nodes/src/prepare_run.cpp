@@ -27,7 +27,7 @@ constexpr char kHelp[] =
 CONFIG         settings file
 AGENTS_LAUNCH  launch file to write: a task_agent for each task and, with --record, rosbag
 key:=value     settings that override the file's; an empty value leaves the file's. The value of
-               `settings` is itself a list of assignments: "settings:=slip:=0.1 beta:=0.5".
+               `settings` is itself a list of assignments: "settings:=slip=0.1 beta=0.5".
 Called by the launch files; exits with 1 and one sentence if the settings are bad.
 )";
 
@@ -48,7 +48,14 @@ std::vector<std::string> readAssignments(const std::vector<std::string>& words) 
     if (value.empty()) continue;
     if (word.substr(0, split) == "settings") {
       std::istringstream in(value);
-      for (std::string one; in >> one;) assignments.push_back(one);
+      // a plain "=" here: roslaunch takes no second ":=" in an argument
+      for (std::string one; in >> one;) {
+        const auto equals = one.find('=');
+        if (equals == std::string::npos || equals == 0 || one[equals - 1] == ':') {
+          throw Error("'" + one + "' in settings is not of the form key=value.");
+        }
+        assignments.push_back(one.replace(equals, 1, ":="));
+      }
     } else {
       assignments.push_back(word.substr(0, split) + ":=" + value);
     }

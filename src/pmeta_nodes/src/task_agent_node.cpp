@@ -7,7 +7,6 @@
 #include "conversions.h"
 #include "node_main.h"
 #include "pmeta_core/base/error.h"
-#include "pmeta_msgs/Trajectory.h"
 
 namespace pmeta_nodes {
 namespace {
@@ -53,7 +52,12 @@ TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task)
   returns_pub_ = nh_.advertise<pmeta_msgs::TaskReturn>("returns", 16, true);
   status_pub_ = nh_.advertise<AgentStatus>("agent_status", 4, true);
   if (experiment.settings().publish_trajectories) {
-    trajectory_pub_ = nh_.advertise<pmeta_msgs::Trajectory>(trajectory, 4, true);
+    // latching would keep only the last policy's episode for late viewers: they get both
+    trajectory_pub_ = nh_.advertise<pmeta_msgs::Trajectory>(
+        trajectory, 4, [this](const ros::SingleSubscriberPublisher& viewer) {
+          const std::lock_guard<std::mutex> lock(mutex_);
+          for (const auto& episode : last_episodes_) viewer.publish(episode.second);
+        });
   }
   setState(AgentStatus::WAITING, "waiting for a meta-policy");
   meta_sub_ = nh_.subscribe("meta_policy", 1, &TaskAgentNode::onMetaPolicy, this, hints);
@@ -217,6 +221,8 @@ void TaskAgentNode::publishEpisode(const pmeta::Episode& episode, int round, pme
   pmeta_msgs::Trajectory msg = toMsg(episode, experiment_, agent_.task(), round, policy);
   msg.header.stamp = ros::Time::now();
   trajectory_pub_.publish(msg);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  last_episodes_[policy] = std::move(msg);
 }
 
 void TaskAgentNode::resend() {

@@ -5,10 +5,13 @@
 #include <pmeta_msgs/MetaPolicy.h>
 #include <pmeta_msgs/RoundSummary.h>
 #include <pmeta_msgs/TaskReturn.h>
+#include <pmeta_msgs/Trajectory.h>
 #include <ros/ros.h>
 
 #include <atomic>
 #include <chrono>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -72,6 +75,7 @@ class TaskAgentNode {
   pmeta_msgs::AgentStatus status_;
   std::vector<pmeta_msgs::TaskReturn> unconfirmed_returns_;
   std::vector<pmeta_msgs::AuxiliaryUpdate> unconfirmed_updates_;
+  std::map<pmeta::Policy, pmeta_msgs::Trajectory> last_episodes_;
   Clock::time_point next_resend_;
   std::chrono::seconds resend_wait_{2};
   int newest_round_ = -1;

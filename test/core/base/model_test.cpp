@@ -34,7 +34,8 @@ TEST(ModelLayout, TextSizeAndHashAreAsSpeltOut) {
 
   // FNV-1a with the prime spelt out as its two bits' worth of shifts
   std::uint64_t hash = 14695981039346656037ULL;
-  for (const char c : network().text()) {
+  const std::string text = network().text();
+  for (const char c : text) {
     hash ^= static_cast<unsigned char>(c);
     hash = (hash << 40) + hash * 0x1b3;
   }
@@ -95,7 +96,9 @@ TEST(ModelLayout, RefusesHostileText) {
 
 TEST(ModelLayout, RefusesBadNames) {
   for (const std::string name : {"", "a b", "a\tb", "a\nb"}) {
-    EXPECT_EQ(errorOf([&] { ModelLayout(Precision::kFloat64, {{name, {2}}}); }),
+    EXPECT_EQ(errorOf([&] {
+                ModelLayout(Precision::kFloat64, {{name, {2}}});
+              }),
               "a model block needs a name without blanks, not '" + name + "'.");
   }
 }
@@ -171,8 +174,7 @@ TEST(CheckModel, SaysWhatDoesNotFit) {
   EXPECT_EQ(refused(model), "task 2 sent 23 values where the layout has 24.");
   model = Model(table());
   model.present.assign(25, 1);
-  EXPECT_EQ(refused(model),
-            "task 2 sent a presence mask of 25 entries where the layout has 24.");
+  EXPECT_EQ(refused(model), "task 2 sent a presence mask of 25 entries where the layout has 24.");
   for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
     model = Model(table());
     model.doubles()[23] = bad;
@@ -206,7 +208,7 @@ TEST(Distance, OfFloatsIsTakenInDouble) {
   Model a(network()), b(network());
   a.floats().assign(10, 16777216.0f);
   b.floats().assign(10, -16777214.0f);
-  // 33554430 is no float of its own squares' sum: the double result is exact to rounding
+  // the squares' sum is no float
   EXPECT_DOUBLE_EQ(distance(a, b), 33554430.0 * std::sqrt(10.0));
 }
 

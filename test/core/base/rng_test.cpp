@@ -172,8 +172,8 @@ TEST(Rng, UniformNeverReachesOne) {
 TEST(Rng, BelowStaysBelowAndIsUniform) {
   Rng rng(11, 0, Stream::kMeasure);
   // 99.99 % quantiles of chi-square with n - 1 degrees of freedom
-  const std::vector<std::pair<int, double>> cases = {{2, 15.14}, {3, 18.42}, {7, 27.86},
-                                                     {10, 33.72}, {64, 112.5}};
+  const std::vector<std::pair<int, double>> cases = {
+      {2, 15.14}, {3, 18.42}, {7, 27.86}, {10, 33.72}, {64, 112.5}};
   for (const auto& [n, quantile] : cases) {
     std::vector<int> counts(n, 0);
     for (int i = 0; i < 20000; ++i) {

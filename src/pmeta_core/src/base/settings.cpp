@@ -1,7 +1,10 @@
 #include "pmeta_core/base/settings.h"
 
 #include <algorithm>
+#include <cctype>
+#include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <set>
@@ -51,7 +54,7 @@ bool parseNumber(const YAML::Node& node, double& value) {
   char* end = nullptr;
   value = std::strtod(text.c_str(), &end);
   return end == text.c_str() + text.size() && std::isfinite(value) &&
-         text.find_first_of("xXpPnN ") == std::string::npos;
+         text.find_first_of("xXpPnN \t\r\n\v\f") == std::string::npos;
 }
 
 bool parseInteger(const YAML::Node& node, std::int64_t& value) {
@@ -68,21 +71,26 @@ bool parseInteger(const YAML::Node& node, std::int64_t& value) {
   return true;
 }
 
-[[noreturn]] void refuse(const std::string& key, const YAML::Node& node, const std::string& source,
+[[noreturn]] void refuse(const std::string& key, const YAML::Node& node, const std::string& where,
                          const std::string& allowed) {
-  throw Error(key + " is '" + shown(node) + "' (" + where(source, node) + ") but must be " +
-              allowed + ".");
+  throw Error(key + " is '" + shown(node) + "' (" + where + ") but must be " + allowed + ".");
 }
 
+// text as YAML, also within a list: bare if it is a plain word, else in double quotes
 std::string quoted(const std::string& text) {
-  YAML::Emitter out;
-  out << text;
   // words that YAML would read as something else
-  static const std::set<std::string> kReserved = {"",    "~",  "null", "true", "false",
-                                                  "yes", "no", "on",   "off"};
+  static const std::set<std::string> kReserved = {"null", "Null", "NULL", "true", "false",
+                                                  "yes",  "no",   "on",   "off"};
+  const bool bare = std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '/' || c == '.' || c == '-';
+  });
   double number = 0;
-  if (kReserved.count(text) != 0 || parseNumber(YAML::Node(text), number))
-    return "\"" + text + "\"";
+  if (bare && !text.empty() && (std::isalpha(text[0]) != 0 || text[0] == '/') &&
+      kReserved.count(text) == 0 && !parseNumber(YAML::Node(text), number)) {
+    return text;
+  }
+  YAML::Emitter out;
+  out << YAML::DoubleQuoted << text;
   return out.c_str();
 }
 
@@ -105,13 +113,13 @@ std::string listText(const std::vector<T>& values,
 
 // reads a list (or a single value as a list of one), each element by `parse`
 template <class T>
-std::vector<T> readList(const std::string& key, const YAML::Node& node, const std::string& source,
+std::vector<T> readList(const std::string& key, const YAML::Node& node, const std::string& where,
                         const std::string& allowed,
                         const std::function<bool(const YAML::Node&, T&)>& parse) {
   std::vector<T> values;
   const auto take = [&](const YAML::Node& element) {
     T value{};
-    if (!parse(element, value)) refuse(key, node, source, allowed);
+    if (!parse(element, value)) refuse(key, node, where, allowed);
     values.push_back(value);
   };
   if (node.IsSequence()) {
@@ -119,7 +127,7 @@ std::vector<T> readList(const std::string& key, const YAML::Node& node, const st
   } else {
     take(node);
   }
-  if (values.empty()) refuse(key, node, source, allowed);
+  if (values.empty()) refuse(key, node, where, allowed);
   return values;
 }
 
@@ -148,10 +156,10 @@ void Settings::add(Entry entry) {
 void Settings::bind(const std::string& key, double& value, const std::string& doc, Range range) {
   const std::string allowed = "a number" + rangeSuffix(range);
   add({key, doc, allowed, "",
-       [=, &value](const YAML::Node& node, const std::string& source) {
+       [=, &value](const YAML::Node& node, const std::string& where) {
          double number = 0;
          if (!parseNumber(node, number) || !range.contains(number)) {
-           refuse(key, node, source, allowed);
+           refuse(key, node, where, allowed);
          }
          value = number;
        },
@@ -162,10 +170,10 @@ void Settings::bind(const std::string& key, std::int64_t& value, const std::stri
                     Range range) {
   const std::string allowed = "a whole number" + rangeSuffix(range);
   add({key, doc, allowed, "",
-       [=, &value](const YAML::Node& node, const std::string& source) {
+       [=, &value](const YAML::Node& node, const std::string& where) {
          std::int64_t number = 0;
          if (!parseInteger(node, number) || !range.contains(static_cast<double>(number))) {
-           refuse(key, node, source, allowed);
+           refuse(key, node, where, allowed);
          }
          value = number;
        },
@@ -176,11 +184,11 @@ void Settings::bind(const std::string& key, int& value, const std::string& doc, 
   range.low = std::max(range.low, static_cast<double>(std::numeric_limits<int>::min()));
   const std::string allowed = "a whole number" + rangeSuffix(range);
   add({key, doc, allowed, "",
-       [=, &value](const YAML::Node& node, const std::string& source) {
+       [=, &value](const YAML::Node& node, const std::string& where) {
          std::int64_t number = 0;
          if (!parseInteger(node, number) || !range.contains(static_cast<double>(number)) ||
              number > std::numeric_limits<int>::max()) {
-           refuse(key, node, source, allowed);
+           refuse(key, node, where, allowed);
          }
          value = static_cast<int>(number);
        },
@@ -190,9 +198,9 @@ void Settings::bind(const std::string& key, int& value, const std::string& doc, 
 void Settings::bind(const std::string& key, bool& value, const std::string& doc) {
   const std::string allowed = "true or false";
   add({key, doc, allowed, "",
-       [=, &value](const YAML::Node& node, const std::string& source) {
+       [=, &value](const YAML::Node& node, const std::string& where) {
          if (!node.IsScalar() || (node.Scalar() != "true" && node.Scalar() != "false")) {
-           refuse(key, node, source, allowed);
+           refuse(key, node, where, allowed);
          }
          value = node.Scalar() == "true";
        },
@@ -203,9 +211,9 @@ void Settings::bind(const std::string& key, std::string& value, const std::strin
                     std::vector<std::string> choices) {
   const std::string allowed = choices.empty() ? "text" : "one of " + join(choices);
   add({key, doc, allowed, "",
-       [=, &value](const YAML::Node& node, const std::string& source) {
+       [=, &value](const YAML::Node& node, const std::string& where) {
          if (!node.IsScalar() || (!choices.empty() && !contains(choices, node.Scalar()))) {
-           refuse(key, node, source, allowed);
+           refuse(key, node, where, allowed);
          }
          value = node.Scalar();
        },
@@ -216,11 +224,12 @@ void Settings::bind(const std::string& key, std::vector<int>& value, const std::
                     Range range) {
   const std::string allowed = "a list of whole numbers" + rangeSuffix(range);
   add({key, doc, allowed, "",
-       [=, &value](const YAML::Node& node, const std::string& source) {
-         value = readList<int>(key, node, source, allowed, [&](const YAML::Node& one, int& out) {
+       [=, &value](const YAML::Node& node, const std::string& where) {
+         value = readList<int>(key, node, where, allowed, [&](const YAML::Node& one, int& out) {
            std::int64_t number = 0;
            if (!parseInteger(one, number) || !range.contains(static_cast<double>(number)) ||
-               std::abs(number) > std::numeric_limits<int>::max()) {
+               number < std::numeric_limits<int>::min() ||
+               number > std::numeric_limits<int>::max()) {
              return false;
            }
            out = static_cast<int>(number);
@@ -236,9 +245,9 @@ void Settings::bind(const std::string& key, std::vector<double>& value, const st
                     Range range) {
   const std::string allowed = "a list of numbers" + rangeSuffix(range);
   add({key, doc, allowed, "",
-       [=, &value](const YAML::Node& node, const std::string& source) {
+       [=, &value](const YAML::Node& node, const std::string& where) {
          value =
-             readList<double>(key, node, source, allowed, [&](const YAML::Node& one, double& out) {
+             readList<double>(key, node, where, allowed, [&](const YAML::Node& one, double& out) {
                return parseNumber(one, out) && range.contains(out);
              });
        },
@@ -250,8 +259,8 @@ void Settings::bind(const std::string& key, std::vector<std::string>& value, con
   const std::string allowed =
       choices.empty() ? "a list of words" : "a list of words out of " + join(choices);
   add({key, doc, allowed, "",
-       [=, &value](const YAML::Node& node, const std::string& source) {
-         value = readList<std::string>(key, node, source, allowed,
+       [=, &value](const YAML::Node& node, const std::string& where) {
+         value = readList<std::string>(key, node, where, allowed,
                                        [&](const YAML::Node& one, std::string& out) {
                                          if (!one.IsScalar()) return false;
                                          out = one.Scalar();
@@ -263,21 +272,20 @@ void Settings::bind(const std::string& key, std::vector<std::string>& value, con
 
 void Settings::read(const YAML::Node& root, const std::string& source) {
   if (!root.IsMap()) throw Error(source + " must hold settings as 'key: value' lines.");
-  readMap(root, "", source);
+  std::set<std::string> seen;
+  readMap(root, "", source, seen);
 }
 
-void Settings::readMap(const YAML::Node& map, const std::string& prefix,
-                       const std::string& source) {
-  std::set<std::string> seen;
+void Settings::readMap(const YAML::Node& map, const std::string& prefix, const std::string& source,
+                       std::set<std::string>& seen) {
   for (const auto& item : map) {
-    const std::string name = shown(item.first);
-    const std::string key = prefix + name;
-    if (!seen.insert(name).second) {
+    const std::string key = prefix + shown(item.first);
+    if (!seen.insert(key).second) {
       throw Error("setting '" + key + "' stands twice (" + where(source, item.first) +
                   "): keep one of them.");
     }
     if (const Entry* entry = find(key)) {
-      entry->read(item.second, source);
+      entry->read(item.second, where(source, item.first));
       continue;
     }
     const bool is_section = std::any_of(entries_.begin(), entries_.end(), [&](const Entry& entry) {
@@ -288,7 +296,7 @@ void Settings::readMap(const YAML::Node& map, const std::string& prefix,
       throw Error("'" + key + "' is a group of settings (" + where(source, item.first) +
                   "): write its keys below it, indented.");
     }
-    readMap(item.second, key + ".", source);
+    readMap(item.second, key + ".", source, seen);
   }
 }
 
@@ -299,13 +307,15 @@ void Settings::assign(const std::string& assignment) {
   }
   const std::string source = "given as " + assignment;
   const std::string key = resolve(assignment.substr(0, split), source);
+  const std::string text = assignment.substr(split + 2);
   YAML::Node value;
   try {
-    value = YAML::Load(assignment.substr(split + 2));
+    value = YAML::Load(text);
   } catch (const YAML::Exception& error) {
     throw Error("the value of " + assignment + " is not valid YAML: " + error.msg + ".");
   }
-  find(key)->read(value.IsNull() ? YAML::Node("") : value, source);
+  // what YAML takes for nothing ("", "~", "#5") is meant as it stands
+  find(key)->read(value.IsNull() ? YAML::Node(text) : value, source);
 }
 
 std::string Settings::resolve(const std::string& name, const std::string& source) const {
@@ -324,10 +334,19 @@ std::string Settings::resolve(const std::string& name, const std::string& source
 std::string Settings::yaml() const {
   std::ostringstream out;
   std::string section;
+  std::set<std::string> written;
   for (const Entry& entry : entries_) {
     const auto dot = entry.key.find('.');
     const std::string group = dot == std::string::npos ? "" : entry.key.substr(0, dot);
-    if (group != section && !group.empty()) out << group << ":\n";
+    if (group != section && !group.empty()) {
+      // a group may stand but once: what is bound to it later is written with its full key
+      if (!written.insert(group).second) {
+        section.clear();
+        out << entry.key << ": " << entry.text() << "\n";
+        continue;
+      }
+      out << group << ":\n";
+    }
     section = group;
     out << (group.empty() ? "" : "  ") << (group.empty() ? entry.key : entry.key.substr(dot + 1))
         << ": " << entry.text() << "\n";
@@ -360,15 +379,18 @@ const Settings::Entry* Settings::find(const std::string& key) const {
 void Settings::refuseUnknown(const std::string& name, const std::string& where) const {
   std::vector<std::string> keys;
   for (const Entry& entry : entries_) keys.push_back(entry.key);
-  std::string best = nearest(name, keys);
+  const auto withLastPart = [&](const std::string& last) {
+    const auto found = std::find_if(keys.begin(), keys.end(),
+                                    [&](const std::string& key) { return lastPart(key) == last; });
+    return found == keys.end() ? std::string() : *found;
+  };
+  // a right name in the wrong group, a misspelt key, or a misspelt short name
+  std::string best = withLastPart(lastPart(name));
+  if (best.empty()) best = nearest(name, keys);
   if (best.empty()) {
-    // a right name in the wrong group, or a misspelt short name
     std::vector<std::string> short_names;
     for (const std::string& key : keys) short_names.push_back(lastPart(key));
-    const std::string short_best = nearest(lastPart(name), short_names);
-    for (std::size_t i = 0; i < keys.size() && !short_best.empty(); ++i) {
-      if (short_names[i] == short_best) best = keys[i];
-    }
+    best = withLastPart(nearest(lastPart(name), short_names));
   }
   throw Error(
       "unknown setting '" + name + "' (" + where + ")" +
@@ -399,7 +421,10 @@ YAML::Node parseYaml(const std::string& text, const std::string& source) {
 YAML::Node loadYamlFile(const std::string& path) {
   std::ifstream file(path);
   std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) throw Error("cannot read the settings file " + path + ".");
+  const bool empty = file.peek() == std::ifstream::traits_type::eof();
+  if (!file || !(empty || text << file.rdbuf())) {
+    throw Error("cannot read the settings file " + path + ".");
+  }
   return parseYaml(text.str(), path);
 }
 
@@ -418,7 +443,7 @@ std::string nearest(const std::string& word, const std::vector<std::string>& can
 
 std::string join(const std::vector<std::string>& words, const std::string& separator) {
   std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
+  for (std::size_t i = 0; i < words.size(); ++i) text += (i == 0 ? "" : separator) + words[i];
   return text;
 }
 

@@ -31,7 +31,7 @@ std::unique_ptr<EnvFamily> makeEnvFamily(const std::string& name) {
   if (found == families().end()) {
     const std::string guess = nearest(name, envFamilyNames());
     throw Error("unknown environment '" + name + "'" +
-                (guess.empty() ? "" : ": did you mean '" + guess + "'?") + " Known are " +
+                (guess.empty() ? "." : ": did you mean '" + guess + "'?") + " Known are " +
                 join(envFamilyNames()) + ".");
   }
   return found->second();

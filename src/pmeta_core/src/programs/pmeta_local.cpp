@@ -176,7 +176,20 @@ int settings(const Arguments& arguments) {
 
 int convergence(Arguments arguments) {
   const std::string config = takeConfig(arguments);
-  return pmeta::runConvergence(config, arguments.words, std::cout);
+  const pmeta::ConvergenceSettings settings = pmeta::loadConvergence(config, arguments.words);
+  const std::string dir = pmeta::convergenceDir(settings);
+  pmeta::requireWritable(settings.results_dir);
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  const auto report =
+      pmeta::measureConvergence(settings, [&](const std::string& what, double done) {
+        if (g_stop) throw Error("stopped; nothing was written.");
+        std::fprintf(stderr, terminal ? "\r\033[K%3.0f %%  %s" : "%3.0f %%  %s\n", 100 * done,
+                     what.c_str());
+      });
+  if (terminal) std::fprintf(stderr, "\r\033[K");
+  pmeta::writeConvergence(report, dir);
+  std::cout << pmeta::convergenceTable(report) << "results in " << dir << std::endl;
+  return 0;
 }
 
 int dispatch(int argc, char** argv) {

@@ -130,7 +130,8 @@ void KnownTask::iterateToFixedPoint(const QTable& anchor, double lambda, QTable&
     before = step;
     regularisedBackup(q, anchor, lambda, next);
     step = distance(q, next);
-    q.swap(next);
+    // copied, not swapped: others may hold the address of q's values
+    std::copy(next.begin(), next.end(), q.begin());
   } while (step > kRelativeStep * (1 + distance(q, zero)) && (before == 0 || step < before));
 }
 
@@ -186,10 +187,9 @@ double KnownTask::distance(const QTable& a, const QTable& b) const {
 }
 
 Model KnownTask::emptyModel() const {
-  Model model(ModelLayout(Precision::kFloat64,
-                          {{"q_table",
-                            {static_cast<std::size_t>(env_->numStates()),
-                             static_cast<std::size_t>(env_->numActions())}}}));
+  Model model(ModelLayout(Precision::kFloat64, {{"q_table",
+                                                 {static_cast<std::size_t>(env_->numStates()),
+                                                  static_cast<std::size_t>(env_->numActions())}}}));
   model.present.assign(table_size_, 0);
   for (const std::size_t k : entries_) model.present[k] = 1;
   return model;

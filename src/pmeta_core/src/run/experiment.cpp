@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
@@ -34,9 +36,16 @@ std::string environmentName(const YAML::Node& root, const std::vector<std::strin
       root["environment"]["name"].IsScalar()) {
     name = root["environment"]["name"].Scalar();
   }
-  const std::string prefix = "environment.name:=";
   for (const std::string& assignment : overrides) {
-    if (assignment.rfind(prefix, 0) == 0) name = assignment.substr(prefix.size());
+    const auto split = assignment.find(":=");
+    const std::string key = assignment.substr(0, split);
+    if (split == std::string::npos || (key != "environment.name" && key != "name")) continue;
+    try {
+      const YAML::Node value = YAML::Load(assignment.substr(split + 2));
+      if (value.IsScalar()) name = value.Scalar();
+    } catch (const YAML::Exception&) {
+      // Settings::assign says what is wrong with it
+    }
   }
   return name;
 }
@@ -160,10 +169,12 @@ void Experiment::checkStability() {
   // with frozen auxiliary parameters the update is a linear map that blows up beyond these
   const double alpha_limit = 2 / (1 + p.lambda + gamma);
   if (p.alpha >= alpha_limit) {
+    // six digits, rounded down so that what is named is allowed
+    const double scale = std::pow(10.0, 5 - std::floor(std::log10(alpha_limit)));
     throw Error("personal.alpha = " + formatNumber(p.alpha) +
                 " with personal.lambda = " + formatNumber(p.lambda) +
                 " diverges: alpha must be below 2 / (1 + lambda + gamma) = " +
-                formatNumber(std::floor(alpha_limit * 1e6) / 1e6) + ".");
+                formatNumber(std::floor(alpha_limit * scale) / scale) + ".");
   }
   if (p.eta * p.lambda >= 2) {
     throw Error("personal.eta = " + formatNumber(p.eta) +
@@ -202,15 +213,19 @@ std::string Experiment::runDir() const {
 
 std::string expandResultsDir(const std::string& results_dir) {
   const std::string home = environmentVariable("HOME");
-  if (results_dir.empty()) {
+  std::string dir = results_dir;
+  if (dir.empty()) {
     const std::string ros_home = environmentVariable("ROS_HOME");
     if (ros_home.empty() && home.empty()) {
       throw Error("results_dir is not given and HOME is not set: give results_dir:=DIR.");
     }
-    return (ros_home.empty() ? home + "/.ros" : ros_home) + "/pmeta";
+    dir = (ros_home.empty() ? home + "/.ros" : ros_home) + "/pmeta";
+  } else if (dir == "~" || dir.rfind("~/", 0) == 0) {
+    if (home.empty()) {
+      throw Error("results_dir is '" + dir + "' but HOME is not set: give results_dir:=DIR.");
+    }
+    dir = home + dir.substr(1);
   }
-  std::string dir = results_dir;
-  if (dir == "~" || dir.rfind("~/", 0) == 0) dir = home + dir.substr(1);
   // nodes run in other working folders than the shell
   return std::filesystem::absolute(dir).lexically_normal().string();
 }

@@ -30,7 +30,9 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
     }
     for (RoundBook::Round& done : book.take()) {
       if (log != nullptr) log->write(done);
-      if (on_round && !on_round(done.summary)) result.stopped = true;
+      if (on_round && !on_round(done.summary)) {
+        result.stopped = round < experiment.settings().rounds;
+      }
       result.rounds.push_back(std::move(done));
     }
   }

@@ -107,12 +107,21 @@ bool RoundBook::hasPersonal(int round) const {
 
 std::vector<int> RoundBook::awaited() const {
   std::vector<int> tasks;
+  if (next_ > rounds_) return tasks;
   const auto it = open_.find(next_);
+  // a closed round does without the personal returns of those it missed
+  const auto owesPersonal = [&](int task) {
+    if (it == open_.end() || !it->second.closed) return true;
+    const std::vector<int>& all = it->second.summary.participants;
+    return std::find(all.begin(), all.end(), task) != all.end();
+  };
   for (int task = 0; task < num_tasks_; ++task) {
     const auto has = [&](Policy policy) {
       return it != open_.end() && it->second.results.count({static_cast<int>(policy), task}) != 0;
     };
-    if (!has(Policy::kPersonal) || (expects_meta_ && !has(Policy::kMeta))) tasks.push_back(task);
+    if ((owesPersonal(task) && !has(Policy::kPersonal)) || (expects_meta_ && !has(Policy::kMeta))) {
+      tasks.push_back(task);
+    }
   }
   return tasks;
 }
@@ -195,10 +204,17 @@ void writeFileAtomically(const std::string& path, const std::string& text) {
   std::ofstream file(temporary, std::ios::binary);
   file << text;
   file.close();
-  if (!file) throw Error("cannot write " + path + " (" + std::strerror(errno) + ").");
   std::error_code error;
-  std::filesystem::rename(temporary, path, error);
-  if (error) throw Error("cannot write " + path + " (" + error.message() + ").");
+  if (!file) {
+    error.assign(errno, std::generic_category());
+  } else {
+    std::filesystem::rename(temporary, path, error);
+  }
+  if (error) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    throw Error("cannot write " + path + " (" + error.message() + ").");
+  }
 }
 
 }  // namespace pmeta

@@ -72,6 +72,7 @@ Episode TaskAgent::recordPersonal() const {
 }
 
 Episode TaskAgent::recordMeta(const MetaPolicy& meta) const {
+  checkModel(meta.model, learner_->layout(), "the aggregator");
   Rng rng = evaluationRng();
   return learner_->record(meta.model, rng);
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -80,7 +81,8 @@ class Settings {
   };
 
   void add(Entry entry);
-  void readMap(const YAML::Node& map, const std::string& prefix, const std::string& source);
+  void readMap(const YAML::Node& map, const std::string& prefix, const std::string& source,
+               std::set<std::string>& seen);
   const Entry* find(const std::string& key) const;
   [[noreturn]] void refuseUnknown(const std::string& name, const std::string& where) const;
 

@@ -95,7 +95,7 @@ struct FixedPointRow {
   double distance = 0;
 };
 
-/// alpha (1 + lambda) from which the expected iteration with a frozen meta table runs away.
+/// alpha (1 + lambda) from which the expected iteration with a frozen meta table no longer settles.
 struct StepLimitRow {
   double lambda = 0;
   double measured = 0;
@@ -121,7 +121,8 @@ struct DistanceRow {
   std::string diversity;
   double lambda = 0;
   double slope = 0;            ///< of the running mean, log-log, over the rounds from 10 on
-  double shape_excess = 0;     ///< largest running_mean / shape over that at round 10
+  double shape_ratio = 0;      ///< running_mean / shape of the last round over that of round 10
+  double gradient_left = 0;    ///< ||grad L||^2 after the last round over that before the first
   double eta = 0;              ///< in use
   double allowed_eta = 0;      ///< the largest that satisfies the theorem's step condition
   double allowed_factor = 0;   ///< ||grad L||^2 after 10 rounds at allowed_eta over that before

@@ -1,0 +1,188 @@
+#include "pmeta_core/run/task_agent.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../support.h"
+#include "pmeta_core/run/meta_aggregator.h"
+
+namespace pmeta {
+namespace {
+
+using test::errorOf;
+using test::gridExperiment;
+
+MetaPolicy firstMeta(const Experiment& experiment) {
+  return MetaAggregator(experiment).metaPolicy();
+}
+
+// a policy with other values, as if published after `round` aggregations
+MetaPolicy laterMeta(const Experiment& experiment, int round) {
+  MetaPolicy meta = firstMeta(experiment);
+  meta.round = round;
+  for (std::size_t k = 0; k < meta.model.size(); ++k) {
+    meta.model.doubles()[k] = -std::fmod(k * 0.37 + round, 9);
+  }
+  return meta;
+}
+
+TEST(TaskAgent, ReportsItsRound) {
+  const Experiment experiment = gridExperiment({"q_learning.updates:=2"});
+  TaskAgent agent(experiment, 1);
+  const MetaPolicy meta = laterMeta(experiment, 4);
+  const auto result = agent.trainRound(meta);
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(agent.task(), 1);
+  EXPECT_EQ(result->update.run_id, "run");
+  EXPECT_EQ(result->update.task, 1);
+  EXPECT_EQ(result->update.round, 5);
+  EXPECT_EQ(result->update.weight, 1);
+  EXPECT_EQ(result->personal.run_id, "run");
+  EXPECT_EQ(result->personal.round, 5);
+  EXPECT_EQ(result->personal.task, 1);
+  EXPECT_EQ(result->personal.policy, Policy::kPersonal);
+  EXPECT_EQ(result->personal.split, Split::kTrain);
+  EXPECT_EQ(result->personal.episodes, 24);
+  EXPECT_EQ(result->personal.updates, 3 * 2);
+  EXPECT_EQ(result->personal.env_steps, 3 * 2 * 2 * 24 * 4);
+  EXPECT_GT(result->loss, 0);
+  EXPECT_GT(result->distance, 0);
+}
+
+TEST(TaskAgent, SendsAuxiliaryOrPersonalParametersAsTheAlgorithmSays) {
+  // beside the agent, a learner that sees the same draws
+  for (const std::string algorithm : {"pmeta", "model_averaging", "independent"}) {
+    const Experiment experiment = gridExperiment({"algorithm:=" + algorithm});
+    TaskAgent agent(experiment, 2);
+    const MetaPolicy meta = laterMeta(experiment, 0);
+    const auto result = agent.trainRound(meta);
+    const auto learner = experiment.makeLearner(2);
+    Rng rng(0, 2, Stream::kSample, 1);
+    learner->beginRound(meta.model, false);
+    for (int r = 0; r < 3; ++r) learner->update(rng);
+    ASSERT_FALSE(learner->personal() == learner->auxiliary());
+    EXPECT_TRUE(result->update.model ==
+                (algorithm == "pmeta" ? learner->auxiliary() : learner->personal()))
+        << algorithm;
+    EXPECT_EQ(result->distance, distance(learner->personal(), meta.model));
+    EXPECT_EQ(result->personal.mean, learner->evaluate(learner->personal(), rng).mean);
+  }
+}
+
+TEST(TaskAgent, ARestartedAgentSendsWhatOneThatNeverStoppedSends) {
+  const Experiment experiment = gridExperiment({"personal_init:=meta"});
+  TaskAgent steady(experiment, 3);
+  for (int round = 0; round < 5; ++round) {
+    const MetaPolicy meta = laterMeta(experiment, round);
+    const auto expected = steady.trainRound(meta);
+    TaskAgent restarted(experiment, 3);
+    const auto found = restarted.trainRound(meta);
+    EXPECT_TRUE(found->update.model == expected->update.model) << "round " << round;
+    EXPECT_EQ(found->personal.mean, expected->personal.mean);
+    EXPECT_EQ(found->distance, expected->distance);
+  }
+}
+
+TEST(TaskAgent, KeptParametersDependOnThePast) {
+  const Experiment experiment = gridExperiment({"personal_init:=keep"});
+  TaskAgent steady(experiment, 3), restarted(experiment, 3);
+  steady.trainRound(laterMeta(experiment, 0));
+  const MetaPolicy meta = laterMeta(experiment, 1);
+  EXPECT_FALSE(steady.trainRound(meta)->update.model == restarted.trainRound(meta)->update.model);
+}
+
+TEST(TaskAgent, SeedTaskAndRoundEachChangeTheDraws) {
+  const Experiment experiment = gridExperiment({"sizes:=[4, 4]"});
+  const Experiment other = gridExperiment({"sizes:=[4, 4]", "seed:=1"});
+  MetaPolicy meta = laterMeta(experiment, 0);
+  const Model base = TaskAgent(experiment, 0).trainRound(meta)->update.model;
+  EXPECT_TRUE(TaskAgent(experiment, 0).trainRound(meta)->update.model == base);
+  EXPECT_FALSE(TaskAgent(other, 0).trainRound(meta)->update.model == base);
+  EXPECT_FALSE(TaskAgent(experiment, 1).trainRound(meta)->update.model == base);
+  meta.round = 1;
+  EXPECT_FALSE(TaskAgent(experiment, 0).trainRound(meta)->update.model == base);
+}
+
+TEST(TaskAgent, StopsWhenToldSo) {
+  const Experiment experiment = gridExperiment({"updates_per_round:=5"});
+  TaskAgent agent(experiment, 0);
+  std::vector<int> seen;
+  const auto stopped = agent.trainRound(firstMeta(experiment), [&](int done) {
+    seen.push_back(done);
+    return done < 3;
+  });
+  EXPECT_FALSE(stopped.has_value());
+  EXPECT_EQ(seen, (std::vector<int>{1, 2, 3}));
+
+  // and trains the same round again as if nothing had been
+  seen.clear();
+  const auto again = agent.trainRound(firstMeta(experiment), [&](int done) {
+    seen.push_back(done);
+    return true;
+  });
+  ASSERT_TRUE(again.has_value());
+  EXPECT_EQ(seen, (std::vector<int>{1, 2, 3, 4, 5}));
+  EXPECT_TRUE(again->update.model ==
+              TaskAgent(experiment, 0).trainRound(firstMeta(experiment))->update.model);
+}
+
+TEST(TaskAgent, EvaluatesTheMetaPolicyOnItsTask) {
+  const Experiment experiment = gridExperiment();
+  const TaskAgent agent(experiment, 2);
+  const MetaPolicy meta = laterMeta(experiment, 3);
+  const TaskReturn result = agent.evaluateMeta(meta);
+  EXPECT_EQ(result.policy, Policy::kMeta);
+  EXPECT_EQ(result.round, 3);
+  EXPECT_EQ(result.task, 2);
+  EXPECT_EQ(result.run_id, "run");
+  EXPECT_EQ(result.env_steps, 0);
+  EXPECT_EQ(result.updates, 0);
+  EXPECT_EQ(result.episodes, 35);
+  Rng rng(0, 0, Stream::kMeasure);
+  EXPECT_EQ(result.mean, experiment.makeLearner(2)->evaluate(meta.model, rng).mean);
+}
+
+TEST(TaskAgent, PoliciesThatDoNotFitAreRefused) {
+  const Experiment experiment = gridExperiment();
+  TaskAgent agent(experiment, 0);
+  MetaPolicy other = firstMeta(gridExperiment({"sizes:=[4, 5]"}));
+  const std::string sentence = "the aggregator sent a model of layout " +
+                               hexHash(other.model.layout.hash()) + " but this run has " +
+                               hexHash(agent.layout().hash()) +
+                               ": start it with the same configuration.";
+  EXPECT_EQ(errorOf([&] { agent.trainRound(other); }), sentence);
+  EXPECT_EQ(errorOf([&] { agent.evaluateMeta(other); }), sentence);
+  EXPECT_EQ(errorOf([&] { agent.recordMeta(other); }), sentence);
+  MetaPolicy broken = firstMeta(experiment);
+  broken.model.doubles()[5] = std::nan("");
+  EXPECT_EQ(errorOf([&] { agent.trainRound(broken); }),
+            "the aggregator sent a value that is not finite (entry 5).");
+}
+
+TEST(TaskAgent, RecordsFromTheSameStartWhateverThePolicyAndRound) {
+  const Experiment experiment = gridExperiment();
+  TaskAgent agent(experiment, 4);
+  agent.trainRound(firstMeta(experiment));
+  const Episode personal = agent.recordPersonal();
+  const Episode meta = agent.recordMeta(laterMeta(experiment, 6));
+  const std::vector<double> start(personal.observations.begin(), personal.observations.begin() + 2);
+  EXPECT_EQ(std::vector<double>(meta.observations.begin(), meta.observations.begin() + 2), start);
+  EXPECT_EQ(agent.recordPersonal().observations, personal.observations);
+}
+
+TEST(TaskAgent, WatchingDoesNotChangeTraining) {
+  const Experiment experiment = gridExperiment({"personal_init:=keep", "slip:=0.2"});
+  TaskAgent watched(experiment, 1), alone(experiment, 1);
+  for (int round = 0; round < 3; ++round) {
+    const MetaPolicy meta = laterMeta(experiment, round);
+    watched.recordMeta(meta);
+    watched.evaluateMeta(meta);
+    const auto a = watched.trainRound(meta), b = alone.trainRound(meta);
+    watched.recordPersonal();
+    EXPECT_TRUE(a->update.model == b->update.model);
+  }
+}
+
+}  // namespace
+}  // namespace pmeta

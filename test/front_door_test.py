@@ -1,0 +1,268 @@
+"""What a user meets at the door: programs, launch files, sweeps, the installed packages."""
+import csv
+import json
+import pathlib
+import random
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+
+TOP = pathlib.Path(__file__).resolve().parent.parent
+LOCAL = TOP / "devel/lib/pmeta_core/pmeta_local"
+CONFIG = TOP / "config/gridworld.yaml"
+
+
+def run(command, timeout=120, **kwargs):
+    """The finished process, with its standard output and error as text."""
+    return subprocess.run([str(word) for word in command], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, universal_newlines=True, timeout=timeout,
+                          **kwargs)
+
+
+def environment(tmp_path, setup="devel/setup.bash"):
+    """An environment for ROS programs, with a master port and a home of its own."""
+    lines = run(["bash", "-c", ". %s && env -0" % (TOP / setup)],
+                env={"PATH": "/usr/bin:/bin:/usr/sbin:/sbin", "HOME": str(tmp_path)}).stdout
+    env = dict(line.split("=", 1) for line in lines.split("\0") if "=" in line)
+    env.update(ROS_HOME=str(tmp_path / "ros"), ROS_IP="127.0.0.1",
+               ROS_MASTER_URI="http://127.0.0.1:%d" % random.randint(20000, 50000))
+    return env
+
+
+def rows_without_time(path):
+    return [line.rsplit(",", 1)[0] for line in path.read_text().splitlines()]
+
+
+BAD_SETTINGS = [
+    ("lamda:=5", "unknown setting 'lamda' (given as lamda:=5): did you mean 'personal.lambda'?"),
+    ("lambda:=ten",
+     "personal.lambda is 'ten' (given as lambda:=ten) but must be a number, at least 0."),
+    ("lambda:=-1",
+     "personal.lambda is '-1' (given as lambda:=-1) but must be a number, at least 0."),
+    ("beta:=1.5",
+     "aggregation.beta is '1.5' (given as beta:=1.5) but must be a number, from 0 to 1."),
+    ("lambda:=50", "personal.alpha = 0.08 with personal.lambda = 50 diverges: alpha must be below "
+                   "2 / (1 + lambda + gamma) = 0.038535."),
+    ("environment.name:=gridwold",
+     "unknown environment 'gridwold': did you mean 'gridworld'? Known are gridworld."),
+    ("rounds:=2.5",
+     "rounds is '2.5' (given as rounds:=2.5) but must be a whole number, from 1 to 1e+06."),
+]
+
+
+@pytest.mark.parametrize("assignment,sentence", BAD_SETTINGS)
+def test_bad_settings_are_told_in_one_sentence(tmp_path, assignment, sentence):
+    result = run([LOCAL, "run", CONFIG, assignment, "results_dir:=%s" % tmp_path])
+    assert result.returncode == 1
+    assert result.stderr == "pmeta: %s\n" % sentence
+    assert not list(tmp_path.iterdir()), "something was started"
+
+
+def test_a_misspelt_key_in_a_file_is_named_with_its_line(tmp_path):
+    config = tmp_path / "bad.yaml"
+    config.write_text("experiment: bad\npersonal:\n  lamda: 5\n")
+    result = run([LOCAL, "run", config])
+    assert result.returncode == 1
+    assert result.stderr == ("pmeta: unknown setting 'personal.lamda' (%s line 3): did you mean "
+                             "'personal.lambda'?\n" % config)
+
+
+def test_an_unwritable_results_folder_is_told_before_anything_starts(tmp_path):
+    (tmp_path / "file").write_text("")
+    result = run([LOCAL, "run", CONFIG, "results_dir:=%s/file/results" % tmp_path])
+    assert result.returncode == 1
+    assert result.stderr == (
+        "pmeta: the results folder %s/file/results cannot be written (Not a directory): choose "
+        "another with results_dir:=DIR.\n" % tmp_path)
+    assert result.stdout == ""
+
+
+def test_launching_with_bad_settings_starts_nothing(tmp_path):
+    result = run(["roslaunch", "pmeta_nodes", "gridworld.launch", "lambda:=-1"],
+                 env=environment(tmp_path))
+    assert result.returncode == 1
+    assert ("pmeta: personal.lambda is '-1' (given as lambda:=-1) but must be a number, at least 0."
+            in result.stderr)
+    assert "started with pid" not in result.stdout
+
+
+def test_launching_takes_any_setting(tmp_path):
+    env = environment(tmp_path)
+    result = run(["roslaunch", "pmeta_nodes", "gridworld.launch", "settings:=betta=1"], env=env)
+    assert result.returncode == 1
+    assert "unknown setting 'betta'" in result.stderr
+    result = run(["roslaunch", "--dump-params", "pmeta_nodes", "gridworld.launch",
+                  "settings:=slip=0.1 sizes=[3,4]", "seed:=5"], env=env)
+    assert "slip: [0.1]" in result.stdout
+    assert "sizes: [3, 4]" in result.stdout
+    assert "seed: 5" in result.stdout
+
+
+def test_the_launch_file_starts_an_agent_for_each_task_of_the_settings(tmp_path):
+    env = environment(tmp_path)
+    for sizes, count in (("[4,5,6,7,8]", 5), ("[3]", 1), ("[3,4,5,6,7,8,9]", 7)):
+        result = run(["roslaunch", "--nodes", "pmeta_nodes", "gridworld.launch",
+                      "settings:=sizes=%s" % sizes], env=env)
+        agents = [line for line in result.stdout.split() if "task_agent" in line]
+        assert agents == ["/pmeta/task_agent_%d" % i for i in range(count)]
+
+
+def test_two_runs_with_one_seed_are_byte_identical_apart_from_wall_s(tmp_path):
+    for run_id in ("a", "b"):
+        result = run([LOCAL, "run", CONFIG, "seed:=3", "results_dir:=%s" % tmp_path,
+                      "run_id:=%s" % run_id])
+        assert result.returncode == 0, result.stderr
+    a, b = (rows_without_time(tmp_path / "gridworld" / name / "rounds.csv") for name in "ab")
+    assert a == b
+    assert len(a) == 1 + 10 * 5 * 2
+    other = run([LOCAL, "run", CONFIG, "seed:=4", "results_dir:=%s" % tmp_path, "run_id:=c"])
+    assert other.returncode == 0
+    assert rows_without_time(tmp_path / "gridworld/c/rounds.csv") != a
+
+
+def test_a_run_is_never_written_over(tmp_path):
+    command = [LOCAL, "run", CONFIG, "results_dir:=%s" % tmp_path, "run_id:=once"]
+    assert run(command).returncode == 0
+    before = (tmp_path / "gridworld/once/rounds.csv").read_bytes()
+    again = run(command)
+    assert again.returncode == 1
+    assert "already holds a run: choose another run_id." in again.stderr
+    assert (tmp_path / "gridworld/once/rounds.csv").read_bytes() == before
+
+
+def test_the_effective_settings_kept_with_a_run_repeat_it(tmp_path):
+    assert run([LOCAL, "run", CONFIG, "lambda:=5", "slip:=0.1", "seed:=2",
+                "results_dir:=%s" % tmp_path, "run_id:=first"]).returncode == 0
+    first = tmp_path / "gridworld/first"
+    assert run([LOCAL, "run", first / "config.yaml", "run_id:=second"]).returncode == 0
+    assert (rows_without_time(first / "rounds.csv")
+            == rows_without_time(tmp_path / "gridworld/second/rounds.csv"))
+
+
+def test_a_sweep_does_each_run_once_and_goes_on_where_it_stopped(tmp_path):
+    command = [LOCAL, "sweep", CONFIG, "lambda:=5,10", "algorithm:=pmeta,model_averaging",
+               "seed:=0-2", "results_dir:=%s" % tmp_path, "--name", "s"]
+    result = run(command)
+    assert result.returncode == 0, result.stderr
+    folder = tmp_path / "sweeps/s/gridworld"
+    # lambda means nothing to model averaging: 2 x 3 runs of pmeta and 3 of averaging
+    assert len(list(folder.iterdir())) == 9
+    assert "[9/9]" in result.stdout and "ETA" in result.stdout
+
+    # one run cut off, one unfinished
+    names = sorted(path.name for path in folder.iterdir())
+    expected = rows_without_time(folder / names[0] / "rounds.csv")
+    manifest = json.loads((folder / names[0] / "manifest.json").read_text())
+    manifest["status"] = "running"
+    (folder / names[0] / "manifest.json").write_text(json.dumps(manifest))
+    (folder / names[0] / "rounds.csv").write_text("round,")
+    shutil.rmtree(str(folder / names[1]))
+    result = run(command)
+    assert result.returncode == 0, result.stderr
+    assert "7 runs had been finished before" in result.stdout
+    assert rows_without_time(folder / names[0] / "rounds.csv") == expected
+    assert sorted(path.name for path in folder.iterdir()) == names
+
+    # the same name for other settings would mix results
+    other = run([LOCAL, "sweep", CONFIG, "lambda:=5,10", "algorithm:=pmeta,model_averaging",
+                 "seed:=0-2", "rounds:=5", "results_dir:=%s" % tmp_path, "--name", "s"])
+    assert other.returncode == 1
+    assert "has other settings: give this sweep another --name" in other.stderr
+
+
+def test_an_interrupted_sweep_keeps_what_is_finished(tmp_path):
+    command = [LOCAL, "sweep", CONFIG, "seed:=0-399", "rounds:=300", "sizes:=[16]",
+               "results_dir:=%s" % tmp_path]
+    process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE,
+                               universal_newlines=True)
+    assert process.stdout.readline().startswith("[1/400]")
+    process.send_signal(signal.SIGINT)
+    output = process.communicate(timeout=60)[0]
+    assert process.returncode == 130
+    assert "stopped; the same command goes on" in output
+    statuses = [json.loads(path.read_text())["status"]
+                for path in tmp_path.glob("sweeps/gridworld/gridworld/*/manifest.json")]
+    assert statuses.count("finished") >= 1 and statuses.count("running") == 0
+
+
+def test_the_launch_ends_by_itself_and_interrupting_it_leaves_what_was_done(tmp_path):
+    env = environment(tmp_path)
+    command = ["roslaunch", "pmeta_nodes", "gridworld.launch", "pace:=0.1",
+               "results_dir:=%s" % tmp_path]
+    result = run(command + ["run_id:=whole", "rounds:=5"], env=env)
+    manifest = json.loads((tmp_path / "gridworld/whole/manifest.json").read_text())
+    assert manifest["status"] == "finished" and manifest["rounds_done"] == 5, result.stdout
+
+    process = subprocess.Popen(command + ["run_id:=cut", "rounds:=1000"], env=env,
+                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    csv_path = tmp_path / "gridworld/cut/rounds.csv"
+    limit = time.time() + 60
+    while not (csv_path.exists() and csv_path.read_text().count("\n") > 20):
+        assert time.time() < limit, "no round was done"
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    manifest = json.loads((tmp_path / "gridworld/cut/manifest.json").read_text())
+    assert manifest["status"] == "stopped"
+    rows = list(csv.DictReader(csv_path.open()))
+    assert max(int(row["round"]) for row in rows) == manifest["rounds_done"] < 1000
+
+
+def test_a_bag_of_the_whole_run_is_recorded_on_request(tmp_path):
+    env = environment(tmp_path)
+    run(["roslaunch", "pmeta_nodes", "gridworld.launch", "pace:=0.3", "record:=true",
+         "results_dir:=%s" % tmp_path, "run_id:=r"], env=env)
+    bag = tmp_path / "gridworld/r.bag"
+    info = run(["rosbag", "info", bag], env=env).stdout
+    for topic in ("/pmeta/auxiliary", "/pmeta/meta_policy", "/pmeta/returns", "/pmeta/round"):
+        assert topic in info, info
+
+
+def test_the_installed_packages_work_like_the_source_tree(tmp_path):
+    # --install in a build folder of catkin: programs, launch files and settings from install/ alone
+    prefix = tmp_path / "install"
+    result = run(["cmake", "-DCMAKE_INSTALL_PREFIX=%s" % prefix, "-P",
+                  TOP / "build/cmake_install.cmake"], timeout=300)
+    assert result.returncode == 0, result.stdout + result.stderr
+    env = environment(tmp_path, prefix / "setup.bash")
+    assert str(TOP / "devel") not in env["ROS_PACKAGE_PATH"]
+    where = run(["rospack", "find", "pmeta_nodes"], env=env).stdout
+    assert where.startswith(str(prefix))
+    run(["roslaunch", "pmeta_nodes", "gridworld.launch", "pace:=0", "results_dir:=%s" % tmp_path,
+         "run_id:=installed"], env=env)
+    manifest = json.loads((tmp_path / "gridworld/installed/manifest.json").read_text())
+    assert manifest["status"] == "finished"
+    plot = run(["rosrun", "pmeta_nodes", "plot.py", "--help"], env=env)
+    assert plot.returncode == 0, plot.stderr
+
+
+def test_every_program_answers_help(tmp_path):
+    env = environment(tmp_path)
+    for program in ("task_agent", "meta_aggregator", "trajectory_view", "prepare_run"):
+        result = run(["rosrun", "pmeta_nodes", program, "--help"], env=env, timeout=20)
+        assert result.returncode == 0 and program in result.stdout
+    assert run([LOCAL, "--help"]).stdout.startswith("usage: pmeta_local")
+    assert run([TOP / "pmeta", "--help"]).stdout.startswith("usage: ./pmeta")
+    unknown = run([TOP / "pmeta", "dmeo"])
+    assert unknown.returncode == 1 and "unknown command 'dmeo'" in unknown.stderr
+
+
+def test_nodes_say_what_they_miss(tmp_path):
+    env = environment(tmp_path)
+    master = subprocess.Popen(["rosmaster", "--core", "-p", env["ROS_MASTER_URI"].rsplit(":")[-1]],
+                              env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        result = run(["rosrun", "pmeta_nodes", "task_agent", "_task:=0", "__ns:=/pmeta"], env=env)
+        assert result.returncode == 1
+        assert "the parameter /pmeta/config is not set" in result.stderr
+        result = run(["rosrun", "pmeta_nodes", "task_agent", "_task:=9",
+                      "_config_file:=%s" % CONFIG], env=env)
+        assert result.returncode == 1
+        assert "task is 9 but must be from 0 to 4." in result.stderr
+    finally:
+        master.terminate()
+        master.wait(timeout=20)
+

@@ -1,0 +1,198 @@
+#include "conversions.h"
+
+#include <gtest/gtest.h>
+#include <ros/serialization.h>
+
+#include <functional>
+#include <limits>
+#include <thread>
+
+#include "mailbox.h"
+#include "pmeta_core/base/error.h"
+
+namespace pmeta_nodes {
+namespace {
+
+// through the wire format and back
+template <class Msg>
+Msg overTheWire(const Msg& msg) {
+  const std::uint32_t size = ros::serialization::serializationLength(msg);
+  std::vector<std::uint8_t> buffer(size);
+  ros::serialization::OStream out(buffer.data(), size);
+  ros::serialization::serialize(out, msg);
+  Msg copy;
+  ros::serialization::IStream in(buffer.data(), size);
+  ros::serialization::deserialize(in, copy);
+  return copy;
+}
+
+pmeta::Model tableModel() {
+  pmeta::Model model(pmeta::ModelLayout(pmeta::Precision::kFloat64, {{"q_table", {3, 2}}}));
+  model.doubles() = {0.1, -0.0, 1e-310, -3e300, std::numeric_limits<double>::quiet_NaN(), 6};
+  model.present = {1, 1, 1, 1, 0, 1};
+  return model;
+}
+
+pmeta::Model networkModel() {
+  pmeta::Model model(pmeta::ModelLayout(pmeta::Precision::kFloat32,
+                                        {{"layer0.weight", {2, 2}}, {"layer0.bias", {2}}}));
+  model.floats() = {0.1f, -2.f, 1e-40f, 3.4e38f, -0.f, 7.f};
+  return model;
+}
+
+std::string errorOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const pmeta::Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Conversions, ModelsKeepEveryBit) {
+  for (const pmeta::Model& model : {tableModel(), networkModel()}) {
+    EXPECT_TRUE(fromMsg(overTheWire(toMsg(model))) == model);
+  }
+}
+
+TEST(Conversions, MetaPolicyRoundTrip) {
+  const pmeta::MetaPolicy meta = {"run", 3, networkModel(), {0, 2}};
+  const pmeta_msgs::MetaPolicy msg = overTheWire(toMsg(meta, 10));
+  EXPECT_EQ(msg.rounds, 10u);
+  const pmeta::MetaPolicy back = fromMsg(msg);
+  EXPECT_EQ(back.run_id, "run");
+  EXPECT_EQ(back.round, 3);
+  EXPECT_EQ(back.participants, (std::vector<int>{0, 2}));
+  EXPECT_TRUE(back.model == meta.model);
+}
+
+TEST(Conversions, AuxiliaryUpdateRoundTrip) {
+  const pmeta::AuxiliaryUpdate update = {"run", 4, 9, tableModel(), 2.5};
+  const pmeta::AuxiliaryUpdate back = fromMsg(overTheWire(toMsg(update)));
+  EXPECT_EQ(back.run_id, "run");
+  EXPECT_EQ(back.task, 4);
+  EXPECT_EQ(back.round, 9);
+  EXPECT_EQ(back.weight, 2.5);
+  EXPECT_TRUE(back.model == update.model);
+}
+
+TEST(Conversions, TaskReturnRoundTrip) {
+  for (const auto policy : {pmeta::Policy::kPersonal, pmeta::Policy::kMeta}) {
+    for (const auto split : {pmeta::Split::kTrain, pmeta::Split::kTest}) {
+      pmeta::TaskReturn result;
+      result.run_id = "run";
+      result.task = 2;
+      result.round = 5;
+      result.split = split;
+      result.policy = policy;
+      result.mean = -1.25;
+      result.std = 0.5;
+      result.episodes = 15;
+      result.env_steps = 1LL << 40;
+      result.updates = 30;
+      result.seconds = 0.125;
+      const pmeta_msgs::TaskReturn msg = overTheWire(toMsg(result, "grid_4x4"));
+      EXPECT_EQ(msg.task_name, "grid_4x4");
+      EXPECT_EQ(msg.policy_name, pmeta::name(policy));
+      EXPECT_EQ(msg.split_name, pmeta::name(split));
+      const pmeta::TaskReturn back = fromMsg(msg);
+      EXPECT_EQ(back.run_id, result.run_id);
+      EXPECT_EQ(back.task, result.task);
+      EXPECT_EQ(back.round, result.round);
+      EXPECT_EQ(back.split, result.split);
+      EXPECT_EQ(back.policy, result.policy);
+      EXPECT_EQ(back.mean, result.mean);
+      EXPECT_EQ(back.std, result.std);
+      EXPECT_EQ(back.episodes, result.episodes);
+      EXPECT_EQ(back.env_steps, result.env_steps);
+      EXPECT_EQ(back.updates, result.updates);
+      EXPECT_EQ(back.seconds, result.seconds);
+    }
+  }
+}
+
+TEST(Conversions, TrajectoriesCarryTheEpisodeAndItsTask) {
+  const auto experiment = pmeta::Experiment::parse("run_id: r", "test");
+  pmeta::Episode episode;
+  episode.observation_size = 2;
+  episode.action_size = 1;
+  episode.observations = {0, 0, 0, 1};
+  episode.actions = {3};
+  episode.rewards = {-5};
+  episode.truncated = true;
+  episode.state_values = {-1, -2};
+  episode.greedy_actions = {3, -1};
+  const pmeta_msgs::Trajectory msg =
+      overTheWire(toMsg(episode, experiment, 1, 4, pmeta::Policy::kMeta));
+  EXPECT_EQ(msg.run_id, "r");
+  EXPECT_EQ(msg.task, 1u);
+  EXPECT_EQ(msg.task_name, "grid_5x5");
+  EXPECT_EQ(msg.header.frame_id, "task_1");
+  EXPECT_EQ(msg.environment, "gridworld");
+  EXPECT_EQ(msg.round, 4u);
+  EXPECT_EQ(msg.policy, pmeta_msgs::Trajectory::META);
+  EXPECT_EQ(msg.observations, episode.observations);
+  EXPECT_EQ(msg.actions, episode.actions);
+  EXPECT_EQ(msg.rewards, episode.rewards);
+  EXPECT_EQ(msg.state_values, episode.state_values);
+  EXPECT_EQ(msg.greedy_actions, episode.greedy_actions);
+  EXPECT_EQ(msg.episode_return, -5);
+  EXPECT_FALSE(msg.terminated);
+  EXPECT_TRUE(msg.truncated);
+}
+
+TEST(Conversions, DamagedModelsAreRefusedWithTheReason) {
+  const pmeta_msgs::ModelBlob good = toMsg(tableModel());
+  const auto refusal = [&](const std::function<void(pmeta_msgs::ModelBlob&)>& spoil) {
+    pmeta_msgs::ModelBlob msg = good;
+    spoil(msg);
+    return errorOf([&] { fromMsg(msg); });
+  };
+  using Blob = pmeta_msgs::ModelBlob;
+  EXPECT_EQ(refusal([](Blob& m) { m.float64_values[0] = 0.2; }),
+            "a model's checksum does not fit its values: it was damaged on the way.");
+  EXPECT_EQ(refusal([](Blob& m) { m.present[4] = 1; }),
+            "a model's checksum does not fit its values: it was damaged on the way.");
+  EXPECT_EQ(refusal([](Blob& m) { m.float64_values.resize(5); }),
+            "a model carries 5 values where its layout has 6.");
+  EXPECT_EQ(refusal([](Blob& m) { m.present.resize(2); }),
+            "a model carries a presence mask of 2 entries for 6 values.");
+  EXPECT_EQ(refusal([](Blob& m) { m.float32_values = {1.f}; }),
+            "a model carries values of another precision than its layout says.");
+  EXPECT_NE(refusal([](Blob& m) { m.layout = "float64\nq_table 2 3\n"; })
+                .find("does not fit its layout"),
+            std::string::npos);
+  EXPECT_NE(refusal([](Blob& m) { m.layout = "nonsense"; }), "no error");
+}
+
+TEST(Conversions, ImpossibleReturnsAreRefused) {
+  pmeta_msgs::TaskReturn msg = toMsg(pmeta::TaskReturn(), "grid");
+  msg.policy = pmeta_msgs::TaskReturn::POLICY_UNKNOWN;
+  EXPECT_EQ(errorOf([&] { fromMsg(msg); }), "a return is of no known policy (0).");
+  msg = toMsg(pmeta::TaskReturn(), "grid");
+  msg.split = 9;
+  EXPECT_EQ(errorOf([&] { fromMsg(msg); }), "a return is of no known split (9).");
+  msg = toMsg(pmeta::TaskReturn(), "grid");
+  msg.task = 0xffffffffu;
+  EXPECT_EQ(errorOf([&] { fromMsg(msg); }), "a message has an impossible task, 4294967295.");
+}
+
+TEST(Mailbox, DropsTheOldestWhenFull) {
+  Mailbox<int> mailbox(2);
+  for (int i = 1; i <= 3; ++i) mailbox.push(i);
+  EXPECT_EQ(mailbox.pop(std::chrono::seconds(0)), 2);
+  EXPECT_EQ(mailbox.pop(std::chrono::seconds(0)), 3);
+  EXPECT_EQ(mailbox.pop(std::chrono::milliseconds(1)), std::nullopt);
+}
+
+TEST(Mailbox, ClosingWakesTheWorkerForGood) {
+  Mailbox<int> mailbox(1);
+  std::thread worker([&] { EXPECT_EQ(mailbox.pop(std::chrono::seconds(60)), std::nullopt); });
+  mailbox.close();
+  worker.join();
+  mailbox.push(1);
+  EXPECT_EQ(mailbox.pop(std::chrono::seconds(60)), std::nullopt);
+}
+
+}  // namespace
+}  // namespace pmeta_nodes

@@ -1,0 +1,85 @@
+#include <pmeta_msgs/AuxiliaryUpdate.h>
+
+#include <cmath>
+#include <limits>
+
+#include "pmeta_core/run/task_agent.h"
+#include "run_over_ros.h"
+
+namespace pmeta_nodes {
+namespace {
+
+class Refusal : public RunOverRos {
+ protected:
+  Refusal() : pub_(nh_.advertise<pmeta_msgs::AuxiliaryUpdate>("auxiliary", 16)) {}
+
+  // an update of task 0 that the aggregator would take, but for what `spoil` does to it
+  pmeta_msgs::AuxiliaryUpdate goodUpdate() {
+    pmeta::MetaAggregator aggregator(experiment_);
+    pmeta::TaskAgent agent(experiment_, 0);
+    return toMsg(agent.trainRound(aggregator.metaPolicy())->update);
+  }
+
+  void expectRefused(const pmeta_msgs::AuxiliaryUpdate& msg, const std::string& reason) {
+    const std::uint32_t before = summary_->refused;
+    const std::size_t seen = history_.size();
+    pub_.publish(msg);
+    ASSERT_TRUE(waitFor([&] { return summary_->refused > before; }, 10)) << reason;
+    bool told = false;
+    for (std::size_t i = seen; i < history_.size(); ++i) {
+      told = told || history_[i].message.find(reason) != std::string::npos;
+    }
+    EXPECT_TRUE(told) << "wanted '" << reason << "', got '" << history_.back().message << "'";
+  }
+
+  ros::Publisher pub_;
+};
+
+TEST_F(Refusal, BadUpdatesAreRefusedWithTheirReasonAndTheRunIsUnharmed) {
+  ASSERT_TRUE(waitFor([&] { return summary_ && pub_.getNumSubscribers() > 0; }));
+
+  pmeta_msgs::AuxiliaryUpdate msg = goodUpdate();
+  msg.model.layout_hash ^= 1;
+  expectRefused(msg, "does not fit its layout");
+
+  msg = goodUpdate();
+  pmeta::Model other(pmeta::ModelLayout(pmeta::Precision::kFloat64, {{"q_table", {4, 4}}}));
+  msg.model = toMsg(other);
+  expectRefused(msg, "start it with the same configuration");
+
+  msg = goodUpdate();
+  msg.model.float64_values[5] += 1;
+  expectRefused(msg, "damaged on the way");
+
+  msg = goodUpdate();
+  msg.model.float64_values.pop_back();
+  expectRefused(msg, "values where its layout has");
+
+  msg = goodUpdate();
+  pmeta::Model poisoned = fromMsg(msg.model);
+  poisoned.doubles()[0] = std::numeric_limits<double>::quiet_NaN();
+  msg.model = toMsg(poisoned);
+  expectRefused(msg, "not finite");
+
+  msg = goodUpdate();
+  msg.run_id = "another";
+  expectRefused(msg, "belongs to run 'another'");
+
+  msg = goodUpdate();
+  msg.task = 77;
+  expectRefused(msg, "is not one of this run's 5 tasks");
+
+  msg = goodUpdate();
+  msg.weight = -1;
+  expectRefused(msg, "not a positive number");
+
+  EXPECT_FALSE(finished()) << "the run was over before the last refusal";
+  ASSERT_TRUE(waitFor([&] { return finished(); }));
+  EXPECT_GE(summary_->refused, 8u);
+  expectEqualsLocal();
+}
+
+}  // namespace
+}  // namespace pmeta_nodes
+
+PMETA_ROSTEST_MAIN("refusal_test")

@@ -1,0 +1,125 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <pmeta_msgs/MetaPolicy.h>
+#include <pmeta_msgs/RoundSummary.h>
+#include <ros/callback_queue.h>
+#include <ros/network.h>
+#include <ros/ros.h>
+#include <signal.h>
+#include <xmlrpcpp/XmlRpcClient.h>
+
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "conversions.h"
+#include "node_main.h"
+#include "pmeta_core/run/local_runner.h"
+
+namespace pmeta_nodes {
+
+/// Follows a run that a .test file has launched in /pmeta, and compares it with the local runner.
+class RunOverRos : public ::testing::Test {
+ protected:
+  RunOverRos() : nh_("/pmeta"), experiment_(readExperiment(nh_, ros::NodeHandle("~"))) {
+    meta_sub_ = nh_.subscribe("meta_policy", 8, &RunOverRos::onMeta, this);
+    round_sub_ = nh_.subscribe("round", 64, &RunOverRos::onRound, this);
+  }
+
+  /// Spins until `condition` holds; false after `seconds`.
+  bool waitFor(const std::function<bool()>& condition, double seconds = 60) {
+    const ros::WallTime limit = ros::WallTime::now() + ros::WallDuration(seconds);
+    while (!condition()) {
+      if (ros::WallTime::now() > limit || !ros::ok()) return false;
+      ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.02));
+    }
+    return true;
+  }
+
+  bool finished() const {
+    return summary_ && summary_->state == pmeta_msgs::RoundSummary::FINISHED;
+  }
+
+  int roundsDone() const { return summary_ ? static_cast<int>(summary_->round) : 0; }
+
+  /// The run's rounds.csv, final meta-policy and status are those of the local runner, bit for bit.
+  void expectEqualsLocal() {
+    const pmeta::LocalResult local = pmeta::runLocally(experiment_);
+    std::vector<std::string> expected = {pmeta::RunLog::csvHeader()};
+    for (const auto& round : local.rounds) {
+      for (const auto& row : round.rows) expected.push_back(pmeta::RunLog::csvLine(row));
+    }
+    for (std::string& line : expected) line = withoutWallTime(line);
+    EXPECT_EQ(readCsv(), expected);
+    EXPECT_EQ(pmeta::runStatus(experiment_.runDir()), "finished");
+    ASSERT_TRUE(waitFor([&] { return meta_ && meta_->round == meta_->rounds; }, 10));
+    EXPECT_TRUE(fromMsg(meta_->model) == local.meta);
+  }
+
+  std::vector<std::string> readCsv() const {
+    std::ifstream file(experiment_.runDir() + "/rounds.csv");
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(file, line);) lines.push_back(withoutWallTime(line));
+    return lines;
+  }
+
+  static std::string withoutWallTime(const std::string& line) {
+    return line.substr(0, line.rfind(','));
+  }
+
+  /// Process id of a node, by asking it.
+  int pidOf(const std::string& node) {
+    XmlRpc::XmlRpcValue request, response, payload;
+    request[0] = ros::this_node::getName();
+    request[1] = node;
+    if (!ros::master::execute("lookupNode", request, response, payload, false)) return -1;
+    std::string host;
+    std::uint32_t port = 0;
+    if (!ros::network::splitURI(std::string(payload), host, port)) return -1;
+    XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
+    XmlRpc::XmlRpcValue caller, answer;
+    caller[0] = ros::this_node::getName();
+    if (!client.execute("getPid", caller, answer) || answer.size() < 3) return -1;
+    return static_cast<int>(answer[2]);
+  }
+
+  /// What a shell command prints.
+  static std::string output(const std::string& command) {
+    std::string text;
+    FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+    char buffer[4096];
+    while (pipe != nullptr && fgets(buffer, sizeof buffer, pipe) != nullptr) text += buffer;
+    if (pipe != nullptr) pclose(pipe);
+    return text;
+  }
+
+  ros::NodeHandle nh_;
+  pmeta::Experiment experiment_;
+  pmeta_msgs::MetaPolicy::ConstPtr meta_;
+  pmeta_msgs::RoundSummary::ConstPtr summary_;
+  std::vector<pmeta_msgs::RoundSummary> history_;
+
+ private:
+  void onMeta(const pmeta_msgs::MetaPolicy::ConstPtr& msg) { meta_ = msg; }
+  void onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
+    summary_ = msg;
+    history_.push_back(*msg);
+  }
+
+  ros::Subscriber meta_sub_;
+  ros::Subscriber round_sub_;
+};
+
+}  // namespace pmeta_nodes
+
+#define PMETA_ROSTEST_MAIN(name)              \
+  int main(int argc, char** argv) {           \
+    testing::InitGoogleTest(&argc, argv);     \
+    ros::init(argc, argv, name);              \
+    const ros::NodeHandle keep_ros_running;   \
+    return RUN_ALL_TESTS();                   \
+  }

@@ -1,0 +1,481 @@
+"""Tests of `pmeta plot`: run folders written here, numbers worked out here from their CSV text."""
+
+import csv
+import json
+import math
+import os
+import statistics
+import subprocess
+import sys
+
+import pytest
+
+SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)),
+                       "..", "src", "pmeta_nodes", "scripts")
+PLOT = os.path.join(SCRIPTS, "plot.py")
+sys.path.insert(0, SCRIPTS)
+import pmeta_figures as pf
+import pmeta_runs as pr
+
+HEADER = "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s"
+CONFIG = """experiment: {experiment}
+algorithm: {algorithm}
+seed: {seed}
+rounds: {rounds}
+results_dir: /somewhere
+run_id: {run_id}
+personal:
+  alpha: 0.08
+  lambda: {lambda_}
+  eta: 0.08
+  personal_init: meta
+aggregation:
+  beta: {beta}
+environment:
+  name: gridworld
+  sizes: [4, 5]
+  slip: [0]
+"""
+
+
+def write_run(top, algorithm="pmeta", seed=0, lambda_=10, rounds=4, status="finished",
+              experiment="grid", run_id=None, scale=1.0, optimal=None, started="2026-01-01"):
+    """A run of two tasks whose returns are uneven numbers, different for every setting and seed."""
+    run_id = run_id or "%s_l%g_s%d" % (algorithm, lambda_, seed)
+    folder = os.path.join(str(top), experiment, run_id)
+    os.makedirs(folder)
+    lambda_ = lambda_ if algorithm == "pmeta" else 0
+    with open(os.path.join(folder, "config.yaml"), "w") as file:
+        file.write(CONFIG.format(experiment=experiment, algorithm=algorithm, seed=seed,
+                                 rounds=rounds, run_id=run_id, lambda_=lambda_,
+                                 beta=0 if algorithm == "independent" else 1))
+    tasks = [{"task": task, "split": "train"} for task in range(2)]
+    for task, value in zip(tasks, optimal or ()):
+        task["optimal_return"] = value
+    with open(os.path.join(folder, "manifest.json"), "w") as file:
+        json.dump({"experiment": experiment, "run_id": run_id, "algorithm": algorithm, "seed": seed,
+                   "status": status, "rounds_done": rounds, "rounds": rounds, "started": started,
+                   "commit": "abc", "tasks": tasks}, file)
+    lines = [HEADER]
+    for round_ in range(1, rounds + 1):
+        for policy in ("personal",) if algorithm == "independent" else ("personal", "meta"):
+            for task in range(2):
+                value = scale * (-40 / round_ - 3 * task - 0.37 * seed * (2 - task) - 0.1 * lambda_
+                                 - 1.7 * (policy == "personal") - math.sin(seed * round_ + lambda_))
+                lines.append("%d,%d,train,%s,%r,1.5,15,%d,%d,0.000010"
+                             % (round_, task, policy, value, 100 * round_, 3 * round_))
+    with open(os.path.join(folder, "rounds.csv"), "w") as file:
+        file.write("\n".join(lines) + "\n")
+    return folder
+
+
+def plot(*arguments, code=0):
+    """Runs the program as a shell does and returns (stdout, stderr)."""
+    done = subprocess.run([PLOT] + [str(a) for a in arguments], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, universal_newlines=True)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stdout, done.stderr
+
+
+def fails(*arguments):
+    """The one sentence with which it refuses."""
+    _, message = plot(*arguments, code=1)
+    lines = message.strip().split("\n")
+    assert lines[-1].startswith("plot: ") and lines[-1].endswith(".")
+    assert all(line.startswith("plot: warning: ") for line in lines[:-1])
+    return lines[-1]
+
+
+def summary(out):
+    with open(os.path.join(str(out), "summary.csv"), encoding="utf-8") as file:
+        return {row["group"]: row for row in csv.DictReader(file)}
+
+
+def curve(folder, policy):
+    """Mean return over the tasks in each round, straight from the file."""
+    by_round = {}
+    with open(os.path.join(folder, "rounds.csv")) as file:
+        for row in csv.DictReader(file):
+            if row["policy"] == policy:
+                by_round.setdefault(int(row["round"]), []).append(float(row["return_mean"]))
+    return [statistics.mean(by_round[r]) for r in sorted(by_round)]
+
+
+def edit(folder, name, change):
+    path = os.path.join(folder, name)
+    with open(path) as file:
+        text = file.read()
+    with open(path, "w") as file:
+        file.write(change(text))
+    return path
+
+
+def groups_of(top):
+    folders, _ = pr.find_folders([str(top)])
+    return pr.group_runs(pr.load_runs(folders))
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    """{(algorithm, lambda): [folder of seed 0, 1, 2]}; model averaging lacks seed 2."""
+    folders = {("pmeta", value): [write_run(tmp_path, seed=s, lambda_=value) for s in range(3)]
+               for value in (1, 10, 50)}
+    folders["model_averaging", 0] = [write_run(tmp_path, "model_averaging", s) for s in range(2)]
+    folders["independent", 0] = [write_run(tmp_path, "independent", s) for s in range(3)]
+    return folders
+
+
+def test_summary_is_what_the_files_say(tmp_path, sweep):
+    plot(tmp_path, "--out", tmp_path / "out", "--format", "png", "--what", "sweep")
+    rows = summary(tmp_path / "out")
+    assert list(rows) == ["pMeta-RL λ=1", "pMeta-RL λ=10", "pMeta-RL λ=50", "model averaging",
+                          "independent"]
+    for value in (1, 10, 50):
+        row = rows["pMeta-RL λ=%d" % value]
+        assert row["seeds"] == "3"
+        for policy, name in (("personal", "pp"), ("meta", "mp")):
+            curves = [curve(folder, policy) for folder in sweep["pmeta", value]]
+            for measure, values in (("last", [c[-1] for c in curves]),
+                                    ("auc", [statistics.mean(c) for c in curves])):
+                key = "%s_%s_" % (name, measure)
+                assert float(row[key + "mean"]) == pytest.approx(statistics.mean(values), rel=1e-13)
+                assert float(row[key + "std"]) == pytest.approx(statistics.stdev(values), rel=1e-9)
+
+
+def test_differences_are_paired_by_seed(tmp_path, sweep):
+    plot(tmp_path, "--out", tmp_path / "out", "--format", "png", "--what", "sweep")
+    rows = summary(tmp_path / "out")
+    for policy, name in (("personal", "pp"), ("meta", "mp")):
+        differences = [statistics.mean(curve(ours, policy)) - statistics.mean(curve(theirs, "meta"))
+                       for ours, theirs in zip(sweep["pmeta", 10], sweep["model_averaging", 0])]
+        row = rows["pMeta-RL λ=10"]
+        assert row["pairs"] == "2"
+        assert float(row[name + "_minus_ma_auc"]) == pytest.approx(statistics.mean(differences))
+        assert float(row[name + "_minus_ma_auc_se"]) == pytest.approx(
+            statistics.stdev(differences) / math.sqrt(2))
+    assert rows["model averaging"]["pairs"] == rows["independent"]["mp_last_mean"] == ""
+
+
+def test_one_seed_has_no_spread(tmp_path):
+    write_run(tmp_path)
+    out, _ = plot(tmp_path, "--format", "png")
+    row = summary(tmp_path / "figures")["pMeta-RL λ=10"]
+    assert row["pp_last_mean"] and not row["pp_last_std"] and not row["pairs"]
+    assert "±" not in out.split("Returns are")[0]
+
+
+def test_writes_what_the_data_allow(tmp_path, sweep):
+    out, err = plot(tmp_path)
+    figures = tmp_path / "figures"
+    names = sorted(os.listdir(str(figures)))
+    assert names == ["lambda_curves.pdf", "lambda_curves.png", "learning_curves.pdf",
+                     "learning_curves.png", "summary.csv", "summary.txt", "sweep_lambda.pdf",
+                     "sweep_lambda.png"]
+    assert all("wrote " + str(figures / name) in out for name in names)
+    assert (figures / "summary.txt").read_text(encoding="utf-8") in out
+    assert (figures / "sweep_lambda.png").read_bytes().startswith(b"\x89PNG")
+    assert (figures / "sweep_lambda.pdf").read_bytes().startswith(b"%PDF")
+    assert err == ""
+
+
+def test_same_runs_give_the_same_bytes(tmp_path):
+    write_run(tmp_path)
+    plot(tmp_path, "--out", tmp_path / "a")
+    plot(tmp_path, "--out", tmp_path / "b")
+    for name in os.listdir(str(tmp_path / "a")):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_what_and_format_limit_what_is_drawn(tmp_path, sweep):
+    plot(tmp_path, "--what", "sweep", "--format", "pdf")
+    assert sorted(os.listdir(str(tmp_path / "figures"))) == ["summary.csv", "summary.txt",
+                                                             "sweep_lambda.pdf"]
+
+
+def test_a_folder_for_every_experiment(tmp_path):
+    write_run(tmp_path)
+    write_run(tmp_path, experiment="other")
+    plot(tmp_path, "--format", "png")
+    for experiment in ("grid", "other"):
+        assert (tmp_path / "figures" / experiment / "learning_curves.png").exists()
+
+
+def test_a_run_given_twice_counts_once(tmp_path):
+    folder = write_run(tmp_path)
+    plot(folder, tmp_path, folder, "--out", tmp_path / "out", "--format", "png")
+    assert summary(tmp_path / "out")["pMeta-RL λ=10"]["seeds"] == "1"
+
+
+def test_lines_and_bands_show_mean_and_deviation(tmp_path, sweep):
+    figure, axes = pf.panels(1, 1)
+    group = groups_of(tmp_path)["grid"][1]
+    pf.draw_curve(axes[0][0], group, "meta", "MP", **pf.MP)
+    curves = list(zip(*(curve(folder, "meta") for folder in sweep["pmeta", 10])))
+    line = axes[0][0].lines[0]
+    assert list(line.get_xdata()) == [1, 2, 3, 4]
+    assert list(line.get_ydata()) == pytest.approx([statistics.mean(c) for c in curves])
+    edges = axes[0][0].collections[0].get_paths()[0].vertices
+    last = sorted(y for x, y in edges if x == 4)
+    middle, spread = statistics.mean(curves[-1]), statistics.stdev(curves[-1])
+    assert (last[0], last[-1]) == pytest.approx((middle - spread, middle + spread))
+
+
+def test_sweep_points_show_mean_and_standard_error(tmp_path, sweep):
+    figure, axes = pf.panels(1, 1)
+    groups = groups_of(tmp_path)["grid"]
+    pf.draw_sweep(axes[0][0], "personal.lambda", groups[:3], "auc", groups)
+    points, _, bars = axes[0][0].containers[0]
+    assert list(points.get_xdata()) == [1, 10, 50]
+    values = [statistics.mean(curve(folder, "meta")) for folder in sweep["pmeta", 10]]
+    middle, error = statistics.mean(values), statistics.stdev(values) / math.sqrt(3)
+    assert points.get_ydata()[1] == pytest.approx(middle)
+    low, high = bars[0].get_segments()[1]
+    assert (low[1], high[1]) == pytest.approx((middle - error, middle + error))
+
+
+def test_labels_name_exactly_what_differs(tmp_path):
+    for init in ("meta", "keep"):
+        folder = write_run(tmp_path, run_id=init)
+        edit(folder, "config.yaml", lambda t: t.replace("_init: meta", "_init: " + init))
+    write_run(tmp_path, "model_averaging")
+    labels = [group.label for group in groups_of(tmp_path)["grid"]]
+    assert labels == ["pMeta-RL λ=10 personal_init=keep", "pMeta-RL λ=10 personal_init=meta",
+                      "model averaging"]
+
+
+def test_numbers_in_exponent_form_are_numbers(tmp_path):
+    for alpha in ("1e-05", "0.00001"):
+        folder = write_run(tmp_path, run_id=alpha, seed=int(alpha == "1e-05"))
+        edit(folder, "config.yaml", lambda t: t.replace("alpha: 0.08", "alpha: " + alpha))
+    assert len(groups_of(tmp_path)["grid"]) == 1
+
+
+def test_curves_show_the_default_strength(tmp_path, sweep):
+    pmeta = pf.pmeta_only(groups_of(tmp_path)["grid"])
+    assert pr.reference(pmeta).settings["personal.lambda"] == 10
+    assert pr.reference([g for g in pmeta if g.settings["personal.lambda"] != 10]).label in (
+        "pMeta-RL λ=1", "pMeta-RL λ=50")
+
+
+def test_baseline_must_share_the_other_settings(tmp_path):
+    write_run(tmp_path, rounds=4)
+    write_run(tmp_path, "model_averaging", rounds=6)
+    plot(tmp_path, "--format", "png")
+    assert summary(tmp_path / "figures")["pMeta-RL λ=10 C=4"]["pairs"] == ""
+
+
+def test_optimum_only_if_every_task_has_it(tmp_path):
+    write_run(tmp_path, optimal=(-4.0, -8.0), experiment="known")
+    write_run(tmp_path, optimal=(-4.0,), experiment="half")
+    groups = groups_of(tmp_path)
+    assert groups["known"][0].optimal() == -6
+    assert groups["half"][0].optimal() is None
+
+
+def test_unfinished_runs_are_left_out_and_named(tmp_path):
+    write_run(tmp_path, seed=0)
+    folder = write_run(tmp_path, seed=1, status="stopped")
+    _, err = plot(tmp_path, "--format", "png")
+    assert folder in err and "'stopped'" in err
+    assert summary(tmp_path / "figures")["pMeta-RL λ=10"]["seeds"] == "1"
+
+
+def test_only_unfinished_runs(tmp_path):
+    write_run(tmp_path, status="running")
+    assert "none of the 1 runs" in fails(tmp_path)
+
+
+def test_repeated_baseline_counts_once_in_silence(tmp_path):
+    for name in ("a", "b"):
+        write_run(tmp_path, "model_averaging", run_id=name)
+    _, err = plot(tmp_path, "--format", "png")
+    assert err == ""
+    assert summary(tmp_path / "figures")["model averaging"]["seeds"] == "1"
+
+
+def test_the_newer_of_two_differing_runs_counts(tmp_path):
+    old = write_run(tmp_path, run_id="z", started="2026-01-01")
+    new = write_run(tmp_path, run_id="a", started="2026-01-02", scale=2)
+    _, err = plot(tmp_path, "--format", "png")
+    assert old + " is left out" in err
+    row = summary(tmp_path / "figures")["pMeta-RL λ=10"]
+    assert float(row["mp_last_mean"]) == pytest.approx(curve(new, "meta")[-1])
+
+
+@pytest.mark.parametrize("change, line, words", [
+    (lambda t: t[:-1], 17, "truncated"),
+    (lambda t: t[:-20], 17, "truncated"),
+    (lambda t: t.replace(",1.5,15,100,", ",1.5,15,", 1), 2, "9 fields instead of 10"),
+    (lambda t: t.replace("1,1,train", "1,x,train", 1), 3, "task is 'x'"),
+    (lambda t: t.replace(",1.5,15,", ",nan,15,", 1), 2, "return_std is 'nan'"),
+    (lambda t: t.replace("train", "trial", 1), 2, "'trial'"),
+    (lambda t: t.replace("1,0,train", "0,0,train", 1), 2, "out of range"),
+    (lambda t: t.replace("1,1,train", "1,0,train", 1), 3, "repeats round 1, task 0"),
+    (lambda t: t.replace("round,", "turn,"), 1, "header"),
+    (lambda t: "", 1, "empty"),
+    (lambda t: t + "\n", 18, "1 fields"),
+])
+def test_malformed_rounds_are_refused_by_line(tmp_path, change, line, words):
+    path = edit(write_run(tmp_path), "rounds.csv", change)
+    message = fails(tmp_path)
+    assert "%s line %d" % (path, line) in message and words in message
+
+
+@pytest.mark.parametrize("keep, words", [
+    (lambda line: not line.startswith("4,"), "ends with round 3"),
+    (lambda line: not line.startswith("2,"), "no personal return of round 2"),
+    (lambda line: line == HEADER, "holds no returns"),
+])
+def test_missing_rounds_of_a_finished_run_are_refused(tmp_path, keep, words):
+    path = edit(write_run(tmp_path), "rounds.csv",
+                lambda t: "".join(l for l in t.splitlines(True) if keep(l.strip())))
+    message = fails(tmp_path)
+    assert path in message and words in message
+
+
+def test_tasks_that_did_not_report_are_named(tmp_path):
+    folder = write_run(tmp_path)
+    edit(folder, "rounds.csv",
+         lambda t: "".join(l for l in t.splitlines(True) if not l.startswith("2,1,train,pers")))
+    _, err = plot(tmp_path, "--format", "png")
+    assert folder in err and "round 2" in err
+
+
+@pytest.mark.parametrize("name, text, words", [
+    ("manifest.json", "{", "not valid JSON"),
+    ("manifest.json", "[]", "JSON object"),
+    ("manifest.json", '{"status": "finished"}', "'experiment' is missing"),
+    ("config.yaml", "a: [", "not valid YAML"),
+    ("config.yaml", "just words", "key: value"),
+])
+def test_broken_files_are_refused_by_name(tmp_path, name, text, words):
+    path = edit(write_run(tmp_path), name, lambda _: text)
+    message = fails(tmp_path)
+    assert path in message and words in message
+
+
+def test_experiment_name_cannot_leave_the_folder(tmp_path):
+    folder = write_run(tmp_path)
+    edit(folder, "manifest.json", lambda t: t.replace('"grid"', '"../../away"'))
+    assert "plain name" in fails(tmp_path)
+
+
+def test_binary_file_is_refused(tmp_path):
+    folder = write_run(tmp_path)
+    with open(os.path.join(folder, "rounds.csv"), "wb") as file:
+        file.write(b"\xff\xfe\x00")
+    assert "not a text file" in fails(tmp_path)
+
+
+def test_bad_arguments(tmp_path):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    write_run(tmp_path)
+    assert "no folder %s/nowhere" % tmp_path in fails(tmp_path / "nowhere")
+    assert "no runs in %s" % empty in fails(empty)
+    assert "not 'curve'" in fails(tmp_path, "--what", "curve")
+    assert "not 'svg'" in fails(tmp_path, "--format", "svg")
+    assert "--bogus" in fails(tmp_path, "--bogus")
+    assert "DIR" in fails()
+    assert "nothing to draw for sweep" in fails(tmp_path, "--what", "sweep")
+    assert "nothing to draw for convergence" in fails(tmp_path, "--what", "convergence")
+    (tmp_path / "file").write_text("")
+    assert "cannot use %s/file" % tmp_path in fails(tmp_path, "--out", tmp_path / "file")
+
+
+def test_averaging_without_meta_returns_is_no_baseline(tmp_path):
+    for value in (5, 10):
+        write_run(tmp_path, lambda_=value)
+    folder = write_run(tmp_path, "model_averaging")
+    edit(folder, "rounds.csv",
+         lambda t: "".join(l for l in t.splitlines(True) if ",meta," not in l))
+    plot(tmp_path, "--format", "png")
+    assert summary(tmp_path / "figures")["pMeta-RL λ=5"]["pairs"] == ""
+
+
+def test_baselines_alone_are_drawn(tmp_path):
+    write_run(tmp_path, "independent")
+    write_run(tmp_path, "model_averaging")
+    plot(tmp_path, "--format", "png")
+    assert (tmp_path / "figures" / "learning_curves.png").exists()
+
+
+def test_a_reader_that_stops_early_is_no_error(tmp_path):
+    write_run(tmp_path)
+    done = subprocess.run("set -o pipefail; '%s' '%s' --format png | true" % (PLOT, tmp_path),
+                          shell=True, executable="/bin/bash", stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert (tmp_path / "figures" / "summary.txt").exists()
+
+
+def test_help():
+    out, _ = plot("--help")
+    assert "--what" in out and "figures" in out
+
+
+@pytest.fixture
+def convergence(tmp_path):
+    """Results that follow the theory exactly."""
+    folder = tmp_path / "convergence" / "run"
+    folder.mkdir(parents=True)
+    lambdas = (1, 5, 10)
+    files = {
+        "manifest.json": '{"status": "finished", "seed": 0}',
+        "statements.csv": "statement,setting,measured,bound,holds,remark\n",
+        "contraction.csv": "lambda,pairs,worst_pair,worst_shift,bound\n" + "".join(
+            "%g,9,%r,%r,%r\n" % (v, 0.9 / (1 + v), 0.9 / (1 + v), 0.9 / (1 + v))
+            for v in (0,) + lambdas),
+        "fixed_point.csv": "lambda,update,sweeps,distance\n" + "".join(
+            "%g,%s,%d,%r\n" % (v, update, k, 0.0 if update == "exact" and k > 10 else 3.0 / k)
+            for v in lambdas for update in ("exact", "robbins_monro") for k in (1, 10, 100)),
+        "gradient.csv": "diversity,lambda,step,eta,round,grad_norm2,running_mean,shape,distance2\n"
+        + "".join("%s,%g,%s,0.1,%d,%r,%r,%r,1\n" % (tasks, v, step, c, v / c, v / c, c ** -0.5)
+                  for tasks in ("corner", "centre", "random") for v in lambdas
+                  for step in ("used", "allowed") for c in range(1, 21)),
+        "distance.csv": "diversity,lambda,distance2,entry_distance2,entry_bound\n" + "".join(
+            "%s,%g,%r,%r,%s\n" % (tasks, v, 9.0 / v ** 2, 1.0 / v ** 2, "nan" if v < 3 else "7")
+            for tasks in ("corner", "centre") for v in lambdas),
+    }
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    return folder
+
+
+def test_convergence_figures(tmp_path, convergence):
+    plot(tmp_path, "--what", "convergence", "--format", "png", "--out", tmp_path / "out")
+    assert sorted(os.listdir(str(tmp_path / "out"))) == [
+        "convergence_%s.png" % name
+        for name in ("contraction", "distance", "fixed_point", "gradient")]
+
+
+def test_convergence_slopes_are_measured(tmp_path, convergence):
+    class Kept(pf.Figures):
+        def save(self, figure, name):
+            self.written.append(figure)
+
+    kept = Kept("", ())
+    pf.draw_convergence(pr.load_convergence([str(convergence)]), kept)
+    contraction, _, gradient, distance = kept.written
+    line = contraction.axes[0].lines[0]
+    assert list(line.get_ydata() * line.get_xdata()) == pytest.approx([0.9] * 50)
+    labels = [text.get_text() for text in gradient.axes[0].get_legend().get_texts()]
+    assert labels[0] == "λ=1, η=0.1: slope −1.00" and labels[-1] == "theory, scaled: slope −0.50"
+    labels = [text.get_text() for text in distance.axes[1].get_legend().get_texts()]
+    assert labels[:2] == ["corner: slope −2.00", "centre: slope −2.00"]
+
+
+def test_broken_convergence_files_are_refused(tmp_path, convergence):
+    path = edit(str(convergence), "gradient.csv", lambda t: t.replace("running_mean", "mean", 1))
+    assert path + " line 1: the column 'running_mean' is missing" in fails(tmp_path)
+    edit(str(convergence), "gradient.csv", lambda t: t.replace("used,0.1", "used,high", 1))
+    assert path + " line 2: eta is 'high'" in fails(tmp_path)
+
+
+def test_convergence_without_a_manifest_has_not_finished(tmp_path, convergence):
+    (convergence / "manifest.json").unlink()
+    assert "none of the 1 runs" in fails(tmp_path)
+
+
+if __name__ == "__main__":
+    sys.exit(pytest.main([__file__]))
