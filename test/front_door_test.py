@@ -45,7 +45,7 @@ BAD_SETTINGS = [
     ("beta:=1.5",
      "aggregation.beta is '1.5' (given as beta:=1.5) but must be a number, from 0 to 1."),
     ("lambda:=50", "personal.alpha = 0.08 with personal.lambda = 50 diverges: alpha must be below "
-                   "2 / (1 + lambda + gamma) = 0.038535."),
+                   "2 / (1 + lambda + gamma) = 0.0385356."),
     ("environment.name:=gridwold",
      "unknown environment 'gridwold': did you mean 'gridworld'? Known are gridworld."),
     ("rounds:=2.5",
@@ -222,13 +222,14 @@ def test_a_bag_of_the_whole_run_is_recorded_on_request(tmp_path):
 
 
 def test_the_installed_packages_work_like_the_source_tree(tmp_path):
-    # --install in a build folder of catkin: programs, launch files and settings from install/ alone
-    prefix = tmp_path / "install"
-    result = run(["cmake", "-DCMAKE_INSTALL_PREFIX=%s" % prefix, "-P",
-                  TOP / "build/cmake_install.cmake"], timeout=300)
+    # programs, launch files and settings from install/ alone; catkin writes its path into setup.sh
+    prefix = TOP / "install"
+    shutil.rmtree(str(prefix), ignore_errors=True)
+    result = run(["make", "-C", TOP / "build", "install"], timeout=300)
     assert result.returncode == 0, result.stdout + result.stderr
-    env = environment(tmp_path, prefix / "setup.bash")
-    assert str(TOP / "devel") not in env["ROS_PACKAGE_PATH"]
+    env = environment(tmp_path, "install/setup.bash")
+    assert str(TOP / "src") not in env["ROS_PACKAGE_PATH"]
+    assert str(TOP / "devel") not in env["LD_LIBRARY_PATH"]
     where = run(["rospack", "find", "pmeta_nodes"], env=env).stdout
     assert where.startswith(str(prefix))
     run(["roslaunch", "pmeta_nodes", "gridworld.launch", "pace:=0", "results_dir:=%s" % tmp_path,

@@ -28,8 +28,9 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
   ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
+  // outside the try: the console falls silent when the last node handle goes
+  const ros::NodeHandle nh;
   try {
-    ros::NodeHandle nh;
     const pmeta::Experiment experiment = readExperiment(nh, ros::NodeHandle("~"));
     const int code = body(experiment);
     ros::shutdown();

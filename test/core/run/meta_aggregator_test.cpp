@@ -77,6 +77,19 @@ TEST(MetaAggregator, MixesEachEntryOverItsOwners) {
   }
 }
 
+TEST(MetaAggregator, WeighsUpdatesByTheirWeight) {
+  const Experiment experiment = gridExperiment({"sizes:=[2, 2]"});
+  MetaAggregator aggregator(experiment);
+  const auto a = makeUpdate(experiment, 0, 1, 3), b = makeUpdate(experiment, 1, 1, 1);
+  aggregator.offer(a);
+  aggregator.offer(b);
+  aggregator.closeRound();
+  for (int k = 0; k < 12; ++k) {
+    EXPECT_NEAR(aggregator.metaPolicy().model.doubles()[k],
+                (3 * a->model.doubles()[k] + b->model.doubles()[k]) / 4, 1e-14);
+  }
+}
+
 TEST(MetaAggregator, ArrivalOrderDoesNotShowInTheBits) {
   const Experiment experiment = gridExperiment();
   Tasks order = {0, 1, 2, 3, 4};

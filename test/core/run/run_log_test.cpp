@@ -331,11 +331,11 @@ TEST(RunLog, ManifestTellsWhatRan) {
   EXPECT_EQ(manifest.at("commit"), commit());
   EXPECT_EQ(manifest.at("versions").at("zlib"), versions().at("zlib"));
   ASSERT_EQ(manifest.at("tasks").size(), 3u);
-  EXPECT_EQ(manifest["tasks"][1],
-            nlohmann::json({{"task", 1},
-                            {"split", "train"},
-                            {"name", "grid_3x3"},
-                            {"description", "3x3 cells, landmark at row 2, column 2"}}));
+  const auto& task = manifest["tasks"][1];
+  EXPECT_EQ(task.at("task"), 1);
+  EXPECT_EQ(task.at("split"), "train");
+  EXPECT_EQ(task.at("name"), "grid_3x3");
+  EXPECT_EQ(task.at("description"), "3x3 cells, landmark at row 2, column 2");
 }
 
 TEST(RunLog, AnExistingRunIsRefusedAndUntouched) {

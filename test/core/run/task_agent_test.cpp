@@ -169,6 +169,12 @@ TEST(TaskAgent, RecordsFromTheSameStartWhateverThePolicyAndRound) {
   const std::vector<double> start(personal.observations.begin(), personal.observations.begin() + 2);
   EXPECT_EQ(std::vector<double>(meta.observations.begin(), meta.observations.begin() + 2), start);
   EXPECT_EQ(agent.recordPersonal().observations, personal.observations);
+
+  // drawn from the stream that is for evaluation
+  Rng rng(0, 4, Stream::kEvaluate);
+  double seen[2];
+  experiment.family().make(4)->reset(rng, seen);
+  EXPECT_EQ(std::vector<double>(seen, seen + 2), start);
 }
 
 TEST(TaskAgent, WatchingDoesNotChangeTraining) {

@@ -154,7 +154,7 @@ void addGradient(const ConvergenceReport& report, std::vector<Statement>& all) {
     // a slope taken before the first descent is over says nothing about the limit
     if (row.slope > kSlowestTerm && row.gradient_left > kSettled) {
       holds = "n/a";
-      remark += ": more rounds";
+      remark += ": too early";
     }
     all.push_back({"2a: running mean |grad L|^2: slope in C", nameOf(row), row.slope, kSlowestTerm,
                    holds, remark});

@@ -207,6 +207,13 @@ std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
                                                   settings_.q_learning, settings_.personal);
 }
 
+std::optional<double> Experiment::optimalReturn(int task) const {
+  const std::unique_ptr<Env> env = family_->make(task);
+  const auto* tabular = dynamic_cast<const TabularEnv*>(env.get());
+  if (tabular == nullptr) return std::nullopt;
+  return pmeta::optimalReturn(*tabular).mean;
+}
+
 std::string Experiment::runDir() const {
   return settings_.results_dir + "/" + settings_.experiment + "/" + settings_.run_id;
 }

@@ -182,10 +182,12 @@ void RunLog::writeManifest(const std::string& status) {
   manifest["versions"] = versions();
   manifest["tasks"] = nlohmann::ordered_json::array();
   for (int task = 0; task < experiment_.numTasks(); ++task) {
-    manifest["tasks"].push_back({{"task", task},
-                                 {"split", "train"},
-                                 {"name", experiment_.family().taskName(task)},
-                                 {"description", experiment_.family().taskDescription(task)}});
+    nlohmann::ordered_json entry = {{"task", task},
+                                    {"split", "train"},
+                                    {"name", experiment_.family().taskName(task)},
+                                    {"description", experiment_.family().taskDescription(task)}};
+    if (const auto optimum = experiment_.optimalReturn(task)) entry["optimal_return"] = *optimum;
+    manifest["tasks"].push_back(std::move(entry));
   }
   writeFileAtomically(dir_ + "/manifest.json", manifest.dump(2) + "\n");
 }

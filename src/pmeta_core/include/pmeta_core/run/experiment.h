@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -62,6 +63,9 @@ class Experiment {
   int quorum() const;  ///< updates needed once the deadline has passed
 
   std::unique_ptr<PersonalLearner> makeLearner(int task) const;
+
+  /// The best return any policy can have on the task, where it can be computed (tabular tasks).
+  std::optional<double> optimalReturn(int task) const;
 
   /// <results_dir>/<experiment>/<run_id>
   std::string runDir() const;
