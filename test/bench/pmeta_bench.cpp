@@ -1,4 +1,5 @@
-// pmeta_bench: the inner loops, each as a share of what this machine can do, measured in the same run
+// pmeta_bench: the inner loops, each as a share of what this machine can do, measured in the same
+// run
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>
 

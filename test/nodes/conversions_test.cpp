@@ -159,9 +159,9 @@ TEST(Conversions, DamagedModelsAreRefusedWithTheReason) {
             "a model carries a presence mask of 2 entries for 6 values.");
   EXPECT_EQ(refusal([](Blob& m) { m.float32_values = {1.f}; }),
             "a model carries values of another precision than its layout says.");
-  EXPECT_NE(refusal([](Blob& m) { m.layout = "float64\nq_table 2 3\n"; })
-                .find("does not fit its layout"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal([](Blob& m) { m.layout = "float64\nq_table 2 3\n"; }).find("does not fit its layout"),
+      std::string::npos);
   EXPECT_NE(refusal([](Blob& m) { m.layout = "nonsense"; }), "no error");
 }
 

@@ -16,9 +16,9 @@ TEST_F(RunOverRos, TopicsReadWellInPlainRosTools) {
   EXPECT_NE(returns.find("return_mean: -"), std::string::npos) << returns;
 
   const std::string topics = output("timeout 20 rostopic list");
-  for (const char* topic : {"/pmeta/agent_status", "/pmeta/auxiliary", "/pmeta/meta_policy",
-                            "/pmeta/returns", "/pmeta/round", "/pmeta/task_0/trajectory",
-                            "/pmeta/task_4/trajectory", "/diagnostics"}) {
+  for (const char* topic :
+       {"/pmeta/agent_status", "/pmeta/auxiliary", "/pmeta/meta_policy", "/pmeta/returns",
+        "/pmeta/round", "/pmeta/task_0/trajectory", "/pmeta/task_4/trajectory", "/diagnostics"}) {
     EXPECT_NE(topics.find(topic), std::string::npos) << topic << " is not in\n" << topics;
   }
   const std::string round = output("timeout 20 rostopic echo -n 1 /pmeta/round/message");
@@ -29,8 +29,7 @@ TEST_F(RunOverRos, TopicsReadWellInPlainRosTools) {
 
 TEST_F(RunOverRos, EveryAgentEndsInStateDone) {
   ASSERT_TRUE(waitFor([&] { return finished(); }));
-  const std::string echo =
-      output("timeout 20 rostopic echo -n 5 /pmeta/agent_status/state");
+  const std::string echo = output("timeout 20 rostopic echo -n 5 /pmeta/agent_status/state");
   std::size_t done = 0;
   for (std::size_t at = echo.find("4\n"); at != std::string::npos; at = echo.find("4\n", at + 1)) {
     ++done;

@@ -10,17 +10,15 @@ namespace {
 
 // the launch file starts agents 0 to 3; this one comes when the round is already late
 TEST_F(RunOverRos, ALateJoinerIsNamedThenTakesPart) {
-  const auto late = [&] {
-    return summary_ && summary_->state == pmeta_msgs::RoundSummary::LATE;
-  };
+  const auto late = [&] { return summary_ && summary_->state == pmeta_msgs::RoundSummary::LATE; };
   ASSERT_TRUE(waitFor(late));
   EXPECT_EQ(summary_->missing, std::vector<std::uint32_t>{4});
   EXPECT_NE(summary_->message.find("task 4 (grid_8x8)"), std::string::npos) << summary_->message;
   EXPECT_NE(summary_->message.find("it goes on when they report"), std::string::npos);
   EXPECT_EQ(summary_->round, 0u);
 
-  const char* arguments[] = {"rosrun",    "pmeta_nodes",  "task_agent",
-                             "_task:=4",  "__ns:=/pmeta", "__name:=task_agent_4", nullptr};
+  const char* arguments[] = {"rosrun",       "pmeta_nodes",          "task_agent", "_task:=4",
+                             "__ns:=/pmeta", "__name:=task_agent_4", nullptr};
   pid_t pid = -1;
   ASSERT_EQ(posix_spawnp(&pid, "rosrun", nullptr, nullptr, const_cast<char**>(arguments), environ),
             0);
@@ -30,7 +28,8 @@ TEST_F(RunOverRos, ALateJoinerIsNamedThenTakesPart) {
   kill(pid, SIGINT);
   int status = -1;
   waitpid(pid, &status, 0);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << "no clean end on SIGINT: " << status;
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0)
+      << "no clean end on SIGINT: " << status;
 }
 
 }  // namespace

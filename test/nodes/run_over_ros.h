@@ -116,10 +116,10 @@ class RunOverRos : public ::testing::Test {
 
 }  // namespace pmeta_nodes
 
-#define PMETA_ROSTEST_MAIN(name)              \
-  int main(int argc, char** argv) {           \
-    testing::InitGoogleTest(&argc, argv);     \
-    ros::init(argc, argv, name);              \
-    const ros::NodeHandle keep_ros_running;   \
-    return RUN_ALL_TESTS();                   \
+#define PMETA_ROSTEST_MAIN(name)            \
+  int main(int argc, char** argv) {         \
+    testing::InitGoogleTest(&argc, argv);   \
+    ros::init(argc, argv, name);            \
+    const ros::NodeHandle keep_ros_running; \
+    return RUN_ALL_TESTS();                 \
   }

@@ -164,7 +164,8 @@ TEST(Experiment, NamesMustBePlain) {
                 key + " is '" + bad + "' but must be a plain name, without blanks or slashes.");
     }
   }
-  EXPECT_EQ(refused({"experiment:="}), "experiment is empty: give the experiment set a name.");
+  EXPECT_EQ(refused({"experiment:="}),
+            "experiment is '' but must be a plain name, without blanks or slashes.");
 }
 
 TEST(Experiment, RunIdIsMadeOfTimeAlgorithmAndSeedIfNotGiven) {

@@ -441,6 +441,13 @@ std::string nearest(const std::string& word, const std::vector<std::string>& can
   return best;
 }
 
+void requirePlainName(const std::string& key, const std::string& value) {
+  if (value.empty() || value.find_first_of("/ \t\n\\\"'") != std::string::npos || value == "." ||
+      value == "..") {
+    throw Error(key + " is '" + value + "' but must be a plain name, without blanks or slashes.");
+  }
+}
+
 std::string join(const std::vector<std::string>& words, const std::string& separator) {
   std::string text;
   for (std::size_t i = 0; i < words.size(); ++i) text += (i == 0 ? "" : separator) + words[i];

@@ -12,7 +12,8 @@ QLearner::BatchStats QLearner::learnBatch(const QTable& q, double samples_per_en
   const int n = env_.numActions();
   const std::vector<int>& states = env_.ownedStates();
   BatchStats stats;
-  stats.samples = std::llround(samples_per_entry * static_cast<double>(states.size()) * n);
+  stats.samples =
+      std::max(1LL, std::llround(samples_per_entry * static_cast<double>(states.size()) * n));
   for (std::int64_t i = 0; i < stats.samples; ++i) {
     const int s = states[rng.below(states.size())];
     const int a = static_cast<int>(rng.below(n));
@@ -25,7 +26,7 @@ QLearner::BatchStats QLearner::learnBatch(const QTable& q, double samples_per_en
     stats.mean_abs_td_error += std::abs(gradient);
     optimizer.apply(entry, &gradient, 1);
   }
-  if (stats.samples > 0) stats.mean_abs_td_error /= static_cast<double>(stats.samples);
+  stats.mean_abs_td_error /= static_cast<double>(stats.samples);
   return stats;
 }
 

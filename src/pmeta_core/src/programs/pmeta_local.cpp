@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/run/convergence.h"
 #include "pmeta_core/run/local_runner.h"
 #include "pmeta_core/run/sweep.h"
+#include "pmeta_core/theory/convergence.h"
 
 namespace {
 

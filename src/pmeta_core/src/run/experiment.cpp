@@ -50,12 +50,6 @@ std::string environmentName(const YAML::Node& root, const std::vector<std::strin
   return name;
 }
 
-void checkName(const std::string& key, const std::string& value) {
-  if (value.find_first_of("/ \t\n\\\"'") != std::string::npos || value == "." || value == "..") {
-    throw Error(key + " is '" + value + "' but must be a plain name, without blanks or slashes.");
-  }
-}
-
 }  // namespace
 
 Experiment Experiment::load(const std::string& path, const std::vector<std::string>& overrides) {
@@ -93,7 +87,8 @@ void Experiment::bind(Settings& s) {
   s.bind("q_learning.updates", e.q_learning.updates, "K: batches before each auxiliary update",
          Range::between(1, 1e6));
   s.bind("q_learning.samples_per_entry", e.q_learning.samples_per_entry,
-         "samples of a batch as a multiple of the entries the task owns", Range::above(0));
+         "samples of a batch as a multiple of the entries the task owns",
+         Range{0, 1e6, true, false});
   s.bind("q_learning.initial_value", e.q_learning.initial_value, "Q at the start");
 
   s.bind("aggregation.beta", e.aggregation.beta, "mixing: meta <- (1 - beta) meta + beta mean",
@@ -118,9 +113,8 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   for (const std::string& assignment : overrides) settings.assign(assignment);
 
   ExperimentSettings& e = experiment.settings_;
-  checkName("experiment", e.experiment);
-  checkName("run_id", e.run_id);
-  if (e.experiment.empty()) throw Error("experiment is empty: give the experiment set a name.");
+  requirePlainName("experiment", e.experiment);
+  if (!e.run_id.empty()) requirePlainName("run_id", e.run_id);
   experiment.family_->build(static_cast<std::uint64_t>(e.seed));
   if (e.aggregation.quorum > experiment.numTasks()) {
     throw Error("aggregation.quorum is " + std::to_string(e.aggregation.quorum) +

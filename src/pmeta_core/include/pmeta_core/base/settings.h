@@ -101,6 +101,9 @@ YAML::Node parseYaml(const std::string& text, const std::string& source);
 /// The candidate closest to `word` by edit distance, or "" if none is close.
 std::string nearest(const std::string& word, const std::vector<std::string>& candidates);
 
+/// Throws Error unless `value` can name a file or folder: not empty, no blanks, quotes or slashes.
+void requirePlainName(const std::string& key, const std::string& value);
+
 /// "a, b, c": words joined for messages and tables.
 std::string join(const std::vector<std::string>& words, const std::string& separator = ", ");
 

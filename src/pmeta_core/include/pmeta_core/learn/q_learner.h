@@ -21,8 +21,9 @@ class QLearner {
   QLearner(const TabularEnv& env, double gamma);
 
   /// One personalised update's samples: round(samples_per_entry * #owned states * #actions)
-  /// transitions (s,a,r,s'), (s,a) uniform over the owned entries; each at once, in place, hands
-  /// the gradient Q(s,a) - [r + gamma max Q(s',.)] of its entry to `optimizer`, which moves `q`.
+  /// (at least one) transitions (s,a,r,s'), (s,a) uniform over the owned entries; each at once, in
+  /// place, hands the gradient Q(s,a) - [r + gamma max Q(s',.)] of its entry to `optimizer`, which
+  /// moves `q`.
   BatchStats learnBatch(const QTable& q, double samples_per_entry, Optimizer<double>& optimizer,
                         Rng& rng) const;
 

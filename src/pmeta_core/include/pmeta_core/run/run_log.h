@@ -87,7 +87,7 @@ class RunLog {
  private:
   void writeManifest(const std::string& status);
 
-  const Experiment& experiment_;
+  Experiment experiment_;
   std::string dir_;
   std::string started_;
   int rounds_done_ = 0;

@@ -35,8 +35,8 @@ struct SweepProgress {
 std::vector<Experiment> planSweep(const SweepPlan& plan);
 
 /// Runs what is not finished yet, `plan.jobs` at a time; a run that was cut off begins anew. Stops
-/// early, keeping what is finished, when `stop` becomes true. Calls on_progress from one thread at a
-/// time. Returns the folder that holds the runs. Throws Error if a finished run there has other
+/// early, keeping what is finished, when `stop` becomes true. Calls on_progress from one thread at
+/// a time. Returns the folder that holds the runs. Throws Error if a finished run there has other
 /// settings under the same name.
 std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
                      const std::function<void(const SweepProgress&)>& on_progress);

@@ -1,7 +1,7 @@
 #include "convergence_tasks.h"
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/run/convergence.h"
 #include "pmeta_core/run/experiment.h"
+#include "pmeta_core/theory/convergence.h"
 
 namespace pmeta {
 namespace {
@@ -57,13 +57,6 @@ void bindAll(Settings& s, ConvergenceSettings& c) {
          Range::halfOpen(0, 1));
 }
 
-void checkName(const std::string& key, const std::string& value) {
-  if (value.empty() || value.find_first_of("/ \t\n\\\"'") != std::string::npos || value == "." ||
-      value == "..") {
-    throw Error(key + " is '" + value + "' but must be a plain name, without blanks or slashes.");
-  }
-}
-
 void refuseRepeats(const std::string& key, std::vector<std::string> words) {
   for (std::size_t i = 0; i < words.size(); ++i) {
     for (std::size_t k = i + 1; k < words.size(); ++k) {
@@ -81,8 +74,8 @@ void refuseRepeats(const std::string& key, const std::vector<double>& values) {
 }
 
 void check(const ConvergenceSettings& c) {
-  checkName("experiment", c.experiment);
-  checkName("run_id", c.run_id);
+  requirePlainName("experiment", c.experiment);
+  requirePlainName("run_id", c.run_id);
   refuseRepeats("diversities", c.diversities);
   refuseRepeats("contraction.lambdas", c.contraction.lambdas);
   refuseRepeats("fixed_point.lambdas", c.fixed_point.lambdas);

@@ -2,9 +2,10 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numeric>
 
 #include "pmeta_core/base/settings.h"
-#include "pmeta_core/run/convergence.h"
+#include "pmeta_core/theory/convergence.h"
 
 namespace pmeta {
 namespace {
@@ -19,6 +20,7 @@ constexpr double kNearLimit = 0.01;
 // the slowest term of the bound of Theorem 2(a) is C^(-1/2)
 constexpr double kSlowestTerm = -0.5;
 constexpr double kSettled = 0.01;
+constexpr double kNearConstant = 0.05;
 constexpr double kNearExponent = 0.1;
 // from here on the distance follows 1 / lambda^2
 constexpr double kExponentFrom = 5;
@@ -204,23 +206,28 @@ void addAllowedStep(const ConvergenceReport& report, std::vector<Statement>& all
   }
 }
 
-// exponent of mean_i ||Q_i* - Q||^2 in lambda, by least squares
+// how nearly mean_i ||Q_i* - Q||^2 goes with 1 / lambda^2
 void addDistance(const ConvergenceReport& report, std::vector<Statement>& all) {
   for (const DiversityRow& set : report.diversities) {
     Line line;
-    double low = std::numeric_limits<double>::infinity();
-    double high = 0;
+    std::vector<double> scaled;
     for (const DistanceRow* row : rowsOf(report, set.diversity)) {
       if (row->lambda < kExponentFrom) continue;
       line.add(std::log(row->lambda), std::log(row->distance2));
-      low = std::min(low, row->lambda * row->lambda * row->distance2);
-      high = std::max(high, row->lambda * row->lambda * row->distance2);
+      scaled.push_back(row->lambda * row->lambda * row->distance2);
     }
     // equal tasks agree in the end, whatever lambda
     if (line.count() < 2 || set.sigma == 0) continue;
-    all.push_back({"2b: mean |Q_i*-Q|^2: exponent in l, +-0.1", set.diversity, line.slope(), -2,
+    const double mean = std::accumulate(scaled.begin(), scaled.end(), 0.0) / scaled.size();
+    double deviation = 0;
+    for (const double one : scaled) deviation = std::max(deviation, std::abs(one / mean - 1));
+    const auto range = std::minmax_element(scaled.begin(), scaled.end());
+    all.push_back({"2b: l^2 mean |Q_i*-Q|^2 constant from l = 5", set.diversity, deviation,
+                   kNearConstant, yesNo(deviation <= kNearConstant),
+                   rounded(*range.first, 4) + ".." + rounded(*range.second, 4)});
+    all.push_back({"2b: its exponent in l", set.diversity, line.slope(), -2,
                    yesNo(std::abs(line.slope() + 2) <= kNearExponent),
-                   "l^2 x: " + rounded(low, 4) + ".." + rounded(high, 4)});
+                   rounded(line.slope() + 2) + " off"});
   }
 }
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "convergence_tasks.h"
-#include "pmeta_core/run/convergence.h"
+#include "pmeta_core/theory/convergence.h"
 
 namespace pmeta {
 

@@ -7,7 +7,7 @@
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/env/tabular_env.h"
 #include "pmeta_core/learn/tabular.h"
-#include "pmeta_core/run/convergence.h"
+#include "pmeta_core/theory/convergence.h"
 
 namespace pmeta {
 

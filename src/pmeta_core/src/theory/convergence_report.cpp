@@ -8,9 +8,9 @@
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/base/version.h"
-#include "pmeta_core/run/convergence.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/run_log.h"
+#include "pmeta_core/theory/convergence.h"
 
 namespace pmeta {
 namespace {

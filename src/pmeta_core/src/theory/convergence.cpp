@@ -1,4 +1,4 @@
-#include "pmeta_core/run/convergence.h"
+#include "pmeta_core/theory/convergence.h"
 
 #include <algorithm>
 
