@@ -6,6 +6,8 @@
 #include <set>
 #include <utility>
 
+#include "figure.h"
+
 namespace pmeta_nodes {
 namespace {
 
@@ -14,9 +16,6 @@ using pmeta_msgs::TaskReturn;
 using pmeta_msgs::Trajectory;
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
-using Color = std_msgs::ColorRGBA;
-
-constexpr double kPi = 3.14159265358979323846;
 
 // scene bands, from the top: title, grids, legend
 constexpr double kTitleHeight = 1.05;
@@ -38,25 +37,6 @@ constexpr double kHeadLayer = 0.25;
 constexpr double kSymbolLayer = 0.3;
 constexpr double kTextLayer = 0.5;
 
-Color rgb(unsigned hex) {
-  Color color;
-  color.r = static_cast<float>((hex >> 16 & 255) / 255.0);
-  color.g = static_cast<float>((hex >> 8 & 255) / 255.0);
-  color.b = static_cast<float>((hex & 255) / 255.0);
-  color.a = 1;
-  return color;
-}
-
-Color mix(const Color& from, const Color& to, double share) {
-  const auto s = static_cast<float>(share);
-  Color color;
-  color.r = from.r + s * (to.r - from.r);
-  color.g = from.g + s * (to.g - from.g);
-  color.b = from.b + s * (to.b - from.b);
-  color.a = 1;
-  return color;
-}
-
 const Color kWhite = rgb(0xffffff);
 const Color kInk = rgb(0x222222);
 const Color kFaint = rgb(0x777777);
@@ -67,18 +47,6 @@ const Color kPersonal = rgb(0xd81b60);
 const Color kMeta = rgb(0x0b4fb3);
 
 Color policyColor(int policy) { return policy == Trajectory::META ? kMeta : kPersonal; }
-
-/// Viridis (van der Walt and Smith), 0 to 1: lightness rises evenly, also for colour-blind eyes.
-Color viridis(double x) {
-  static const Color kAnchors[] = {rgb(0x440154), rgb(0x472d7b), rgb(0x3b528b),
-                                   rgb(0x2c728e), rgb(0x21918c), rgb(0x28ae80),
-                                   rgb(0x5ec962), rgb(0xaddc30), rgb(0xfde725)};
-  const double at = std::clamp(x, 0.0, 1.0) * 8;
-  const int i = std::min(static_cast<int>(at), 7);
-  return mix(kAnchors[i], kAnchors[i + 1], at - i);
-}
-
-double luminance(const Color& c) { return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b; }
 
 /// Columns and rows of tasks that make the grids as large as possible.
 struct Layout {
@@ -106,135 +74,6 @@ Layout layoutGrids(int num_tasks) {
     if (layout.side > best.side) best = layout;
   }
   return best;
-}
-
-struct Point {
-  double x = 0;
-  double y = 0;
-};
-
-Marker makeMarker(const std::string& frame, const std::string& ns, int id) {
-  Marker marker;
-  marker.header.frame_id = frame;
-  marker.ns = ns;
-  marker.id = id;
-  marker.pose.orientation.w = 1;
-  return marker;
-}
-
-/// Flat figures as one marker of coloured triangles, which rviz draws without shading.
-class Figure {
- public:
-  Figure(const std::string& frame, const std::string& ns, int id, double layer)
-      : marker_(makeMarker(frame, ns, id)), z_(layer) {
-    marker_.type = Marker::TRIANGLE_LIST;
-    marker_.scale.x = marker_.scale.y = marker_.scale.z = 1;
-    marker_.color = kWhite;
-  }
-
-  /// What follows is drawn above what was drawn so far.
-  void raise() { z_ += 0.01; }
-  void moveTo(double layer) { z_ = layer; }
-
-  /// A polygon all of whose corners can be seen from `centre`.
-  void polygon(const Point& centre, const std::vector<Point>& corners, const Color& color) {
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-      triangle(centre, corners[i], corners[(i + 1) % corners.size()], color);
-    }
-  }
-
-  void rectangle(double left, double bottom, double right, double top, const Color& color) {
-    triangle({left, bottom}, {right, bottom}, {right, top}, color);
-    triangle({left, bottom}, {right, top}, {left, top}, color);
-  }
-
-  void disc(const Point& centre, double radius, const Color& color) {
-    std::vector<Point> rim;
-    for (int i = 0; i < 20; ++i) rim.push_back(polar(centre, radius, 2 * kPi * i / 20));
-    polygon(centre, rim, color);
-  }
-
-  /// A star of five points, one of them up.
-  void star(const Point& centre, double radius, const Color& color) {
-    std::vector<Point> rim;
-    for (int i = 0; i < 10; ++i) {
-      rim.push_back(polar(centre, i % 2 == 0 ? radius : 0.45 * radius, kPi / 2 + kPi * i / 5));
-    }
-    polygon(centre, rim, color);
-  }
-
-  void segment(const Point& from, const Point& to, double width, const Color& color) {
-    const double length = std::hypot(to.x - from.x, to.y - from.y);
-    if (length == 0) return;
-    const double dx = -(to.y - from.y) / length * width / 2;
-    const double dy = (to.x - from.x) / length * width / 2;
-    triangle({from.x + dx, from.y + dy}, {from.x - dx, from.y - dy}, {to.x - dx, to.y - dy}, color);
-    triangle({from.x + dx, from.y + dy}, {to.x - dx, to.y - dy}, {to.x + dx, to.y + dy}, color);
-  }
-
-  /// An x.
-  void cross(const Point& centre, double radius, double width, const Color& color) {
-    for (const double angle : {kPi / 4, 3 * kPi / 4}) {
-      segment(polar(centre, radius, angle), polar(centre, -radius, angle), width, color);
-    }
-  }
-
-  /// An arrow through `centre`, pointing where `angle` says.
-  void arrow(const Point& centre, double length, double angle, const Color& color) {
-    const Point tip = polar(centre, length / 2, angle);
-    const Point neck = polar(centre, 0.02 * length, angle);
-    segment(polar(centre, -length / 2, angle), neck, 0.16 * length, color);
-    triangle(polar(neck, 0.3 * length, angle + kPi / 2),
-             polar(neck, -0.3 * length, angle + kPi / 2), tip, color);
-  }
-
-  /// Only the head of an arrow.
-  void head(const Point& centre, double length, double angle, const Color& color) {
-    const Point foot = polar(centre, -length / 2, angle);
-    triangle(polar(foot, length / 2, angle + kPi / 2), polar(foot, -length / 2, angle + kPi / 2),
-             polar(centre, length / 2, angle), color);
-  }
-
-  /// An empty figure deletes what stood in its place.
-  Marker take() {
-    marker_.action = marker_.points.empty() ? Marker::DELETE : Marker::ADD;
-    return std::move(marker_);
-  }
-
- private:
-  static Point polar(const Point& centre, double radius, double angle) {
-    return {centre.x + radius * std::cos(angle), centre.y + radius * std::sin(angle)};
-  }
-
-  void triangle(const Point& a, const Point& b, const Point& c, const Color& color) {
-    for (const Point& corner : {a, b, c}) {
-      geometry_msgs::Point point;
-      point.x = corner.x;
-      point.y = corner.y;
-      point.z = z_;
-      marker_.points.push_back(point);
-      marker_.colors.push_back(color);
-    }
-  }
-
-  Marker marker_;
-  double z_;
-};
-
-/// Text centred at `at`, made smaller if it is wider than `width`; "" deletes it.
-Marker textMarker(const std::string& frame, const std::string& ns, int id, const Point& at,
-                  const std::string& text, double height, double width, const Color& color) {
-  constexpr double kLetterWidth = 0.5;  // of its height, on average
-  Marker marker = makeMarker(frame, ns, id);
-  marker.type = Marker::TEXT_VIEW_FACING;
-  marker.action = text.empty() ? Marker::DELETE : Marker::ADD;
-  marker.pose.position.x = at.x;
-  marker.pose.position.y = at.y;
-  marker.pose.position.z = kTextLayer;
-  marker.scale.z = std::min(height, width / (kLetterWidth * std::max<std::size_t>(text.size(), 1)));
-  marker.color = color;
-  marker.text = text;
-  return marker;
 }
 
 std::string number(double value) {
@@ -448,11 +287,12 @@ void drawLabels(const GridPicture& picture, const std::string& below, MarkerArra
   const double band = picture.layout.label_band;
   const double height = kLetterShare * band;
   const double width = 0.95 * picture.layout.slot_width;
-  scene.markers.push_back(textMarker(picture.frame, "labels", picture.id, {middle, band / 2}, above,
-                                     height, width, policyColor(picture.policy)));
+  scene.markers.push_back(textMarker(picture.frame, "labels", picture.id, {middle, band / 2},
+                                     kTextLayer, above, height, width,
+                                     policyColor(picture.policy)));
   scene.markers.push_back(textMarker(picture.frame, "returns", picture.id,
-                                     {middle, -picture.side - band / 2}, below, height, width,
-                                     kInk));
+                                     {middle, -picture.side - band / 2}, kTextLayer, below, height,
+                                     width, kInk));
 }
 
 std::string resultText(const PolicyView& view, const SceneContent& content, bool is_meta) {
@@ -518,11 +358,11 @@ void drawTitle(const SceneContent& content, MarkerArray& scene) {
 
   const double top = kSceneHeight / 2;
   scene.markers.push_back(
-      textMarker(kWorldFrame, "title", 0, {0, top - 0.3}, title, 0.3, 11.5, kInk));
+      textMarker(kWorldFrame, "title", 0, {0, top - 0.3}, kTextLayer, title, 0.3, 11.5, kInk));
+  scene.markers.push_back(textMarker(kWorldFrame, "title", 1, {-2.2, top - 0.72}, kTextLayer,
+                                     personal, 0.23, 4.2, kPersonal));
   scene.markers.push_back(
-      textMarker(kWorldFrame, "title", 1, {-2.2, top - 0.72}, personal, 0.23, 4.2, kPersonal));
-  scene.markers.push_back(
-      textMarker(kWorldFrame, "title", 2, {2.2, top - 0.72}, meta, 0.23, 4.2, kMeta));
+      textMarker(kWorldFrame, "title", 2, {2.2, top - 0.72}, kTextLayer, meta, 0.23, 4.2, kMeta));
 }
 
 /// What the symbols mean, along the lower edge.
@@ -548,7 +388,8 @@ void drawLegend(MarkerArray& scene) {
                                                   {2.67, "landmark"},      {4.06, "out of time"}};
   int id = 1;
   for (const auto& [x, text] : texts) {
-    scene.markers.push_back(textMarker(kWorldFrame, "legend", id++, {x, y}, text, 0.17, 2, kFaint));
+    scene.markers.push_back(
+        textMarker(kWorldFrame, "legend", id++, {x, y}, kTextLayer, text, 0.17, 2, kFaint));
   }
 }
 

@@ -11,6 +11,7 @@ constexpr char kHelp[] =
   rosrun pmeta_nodes trajectory_view __ns:=/pmeta
 
 private parameters
+  ~redraw_rate  at most so many pictures a second, up to 60 (default 10)
   ~config_file  settings file; by default the parameter `config` of the namespace is read
 subscribes   task_<i>/trajectory, round, returns
 publishes    markers (latched), static TF frames task_<i>/personal and task_<i>/meta below pmeta

@@ -107,10 +107,10 @@ TEST(QLearner, DrawsOwnedEntriesUniformly) {
   EXPECT_LT(test::chiSquare(owned), 69.9);  // 99.99 %, 31 degrees of freedom
 }
 
-TEST(QLearner, RoundsTheNumberOfSamples) {
+TEST(QLearner, RoundsTheNumberOfSamplesToAtLeastOne) {
   const Gridworld env({2, 1, 1, 0}, 2);  // 12 entries
   const std::vector<std::pair<double, int>> cases = {{1, 12},       {2, 24},   {0.5, 6},
-                                                     {1.0 / 12, 1}, {0.13, 2}, {0.04, 0}};
+                                                     {1.0 / 12, 1}, {0.13, 2}, {0.04, 1}};
   for (const auto& [samples_per_entry, samples] : cases) {
     Recorder recorder;
     Rng rng(5, 0, Stream::kSample);
