@@ -77,7 +77,6 @@ TaskAgentNode::~TaskAgentNode() {
 }
 
 int TaskAgentNode::spin() {
-  ros::WallRate rate(100);
   Clock::time_point alone_since = Clock::now();
   while (!stopRequested() && !failed_) {
     ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
