@@ -87,10 +87,12 @@ class RunOverRos : public ::testing::Test {
     return static_cast<int>(answer[2]);
   }
 
-  /// What a shell command prints.
+  /// What a shell command prints. It sources the workspace anew: the environment that catkin gives
+  /// to tests is as old as the first configuration, when there were no Python messages yet.
   static std::string output(const std::string& command) {
     std::string text;
-    FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+    const std::string source = ". \"${CMAKE_PREFIX_PATH%%:*}/setup.sh\" && ";
+    FILE* pipe = popen((source + command + " 2>&1").c_str(), "r");
     char buffer[4096];
     while (pipe != nullptr && fgets(buffer, sizeof buffer, pipe) != nullptr) text += buffer;
     if (pipe != nullptr) pclose(pipe);

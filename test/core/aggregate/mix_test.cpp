@@ -73,7 +73,7 @@ void expectReference(std::size_t n, double absent, double beta) {
 }
 
 TEST(Mix, MatchesANaiveReferenceAroundTheChunkSize) {
-  for (const std::size_t n : {1, 2, 7, 1023, 1024, 1025, 5000}) {
+  for (const std::size_t n : {1, 2, 7, 1023, 8191, 8192, 8193, 20000}) {
     for (const double absent : {0.0, 0.3, 0.9}) {
       for (const double beta : {0.0, 0.3, 1.0}) {
         expectReference<float>(n, absent, beta);

@@ -16,31 +16,69 @@
 namespace pmeta {
 namespace {
 
-// entries handled at a time: their sums stay in the first-level cache
-constexpr std::size_t kChunk = 1024;
+// entries handled at a time: their sums stay in the second-level cache, and each contribution is
+// read in runs long enough for the memory to stream
+constexpr std::size_t kChunk = 8192;
+
+// contributions added in one pass over the sums, in their order: the same bits as one by one
+constexpr std::size_t kTogether = 4;
 
 template <class Scalar>
-inline void accumulateAll(double* sum, const Scalar* values, double weight, std::size_t n) {
-  for (std::size_t k = 0; k < n; ++k) sum[k] += weight * static_cast<double>(values[k]);
+inline __attribute__((always_inline)) void addOne(double* __restrict sum,
+                                                  const Scalar* __restrict x, double weight,
+                                                  std::size_t n) {
+  for (std::size_t k = 0; k < n; ++k) sum[k] += weight * static_cast<double>(x[k]);
 }
 
-PMETA_VECTORISED void accumulate(double* sum, const float* values, double weight, std::size_t n) {
-  accumulateAll(sum, values, weight, n);
+template <class Scalar>
+inline __attribute__((always_inline)) void addTogether(double* __restrict sum,
+                                                       const Scalar* const* x, const double* weight,
+                                                       std::size_t n) {
+  const Scalar* __restrict x0 = x[0];
+  const Scalar* __restrict x1 = x[1];
+  const Scalar* __restrict x2 = x[2];
+  const Scalar* __restrict x3 = x[3];
+  const double w0 = weight[0], w1 = weight[1], w2 = weight[2], w3 = weight[3];
+  for (std::size_t k = 0; k < n; ++k) {
+    double total = sum[k];
+    total += w0 * static_cast<double>(x0[k]);
+    total += w1 * static_cast<double>(x1[k]);
+    total += w2 * static_cast<double>(x2[k]);
+    total += w3 * static_cast<double>(x3[k]);
+    sum[k] = total;
+  }
 }
 
-PMETA_VECTORISED void accumulate(double* sum, const double* values, double weight, std::size_t n) {
-  accumulateAll(sum, values, weight, n);
+template <class Scalar>
+inline __attribute__((always_inline)) void addAll(double* sum, const Scalar* const* x,
+                                                  const double* weight, std::size_t count,
+                                                  std::size_t n) {
+  std::size_t i = 0;
+  for (; i + kTogether <= count; i += kTogether) addTogether(sum, x + i, weight + i, n);
+  for (; i < count; ++i) addOne(sum, x[i], weight[i], n);
+}
+
+// sum[k] += weight[i] * x[i][k], i ascending
+PMETA_VECTORISED void accumulate(double* sum, const float* const* x, const double* weight,
+                                 std::size_t count, std::size_t n) {
+  addAll(sum, x, weight, count, n);
+}
+
+PMETA_VECTORISED void accumulate(double* sum, const double* const* x, const double* weight,
+                                 std::size_t count, std::size_t n) {
+  addAll(sum, x, weight, count, n);
 }
 
 template <class Scalar>
 void mixValues(std::vector<Scalar>& meta, const std::vector<Contribution>& contributions,
                double beta) {
-  std::vector<const std::vector<Scalar>*> values;
+  std::vector<const Scalar*> chunk(contributions.size());  // where each one's chunk begins
+  std::vector<double> weights;
   bool any_mask = false;
   double total_weight = 0;
   for (const Contribution& one : contributions) {
-    values.push_back(&std::get<std::vector<Scalar>>(one.model->values));
     any_mask = any_mask || !one.model->present.empty();
+    weights.push_back(one.weight);
     total_weight += one.weight;
   }
 
@@ -51,15 +89,14 @@ void mixValues(std::vector<Scalar>& meta, const std::vector<Contribution>& contr
     std::fill_n(sum, n, 0.0);
     std::fill_n(weight, n, any_mask ? 0.0 : total_weight);
     for (std::size_t i = 0; i < contributions.size(); ++i) {
-      const Scalar* x = values[i]->data() + begin;
-      if (!any_mask) {
-        accumulate(sum, x, contributions[i].weight, n);
-        continue;
-      }
+      chunk[i] = std::get<std::vector<Scalar>>(contributions[i].model->values).data() + begin;
+    }
+    if (!any_mask) accumulate(sum, chunk.data(), weights.data(), chunk.size(), n);
+    for (std::size_t i = 0; any_mask && i < contributions.size(); ++i) {
       for (std::size_t k = 0; k < n; ++k) {
         if (!contributions[i].model->isPresent(begin + k)) continue;
-        sum[k] += contributions[i].weight * static_cast<double>(x[k]);
-        weight[k] += contributions[i].weight;
+        sum[k] += weights[i] * static_cast<double>(chunk[i][k]);
+        weight[k] += weights[i];
       }
     }
     for (std::size_t k = 0; k < n; ++k) {

@@ -18,7 +18,7 @@ struct Contribution {
 /// Each entry averages over the contributions that have it present (the paper's N_s); an entry that
 /// none has keeps its value. Sums run in the order given, in double precision, so that the result
 /// depends on that order and nothing else. Reads each value once; extra memory does not grow with
-/// the number of contributions or parameters.
+/// the number of parameters.
 void mixInto(Model& meta, const std::vector<Contribution>& contributions, double beta);
 
 }  // namespace pmeta
