@@ -254,8 +254,9 @@ HealthReport TaskAgentNode::health() {
   const std::lock_guard<std::mutex> lock(mutex_);
   HealthReport report;
   report.level = status_.state == AgentStatus::FAILED ? HealthReport::kError : HealthReport::kOk;
-  report.summary = std::string(stateName(status_.state)) + ": " + status_.message;
-  report.values = {{"round", std::to_string(status_.round)},
+  report.summary = status_.message;
+  report.values = {{"state", stateName(status_.state)},
+                   {"round", std::to_string(status_.round)},
                    {"updates/s", pmeta::formatNumber(status_.updates_per_s)},
                    {"env steps/s", pmeta::formatNumber(status_.env_steps_per_s)},
                    {"loss", pmeta::formatNumber(status_.loss)},
