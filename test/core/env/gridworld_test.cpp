@@ -193,6 +193,23 @@ TEST(Gridworld, CertainMovesDrawNothing) {
   EXPECT_EQ(rng.state(), state);
 }
 
+TEST(Gridworld, TakesUpOnlyStatesOfItsGrid) {
+  Gridworld env({3, 2, 2, 0}, 5);
+  env.setState({2 * 5 + 1, 4});
+  EXPECT_EQ(env.state(), (std::vector<double>{11, 4}));
+  Rng rng(11, 0, Stream::kMeasure);
+  double seen[2];
+  const double right = kRight;
+  EXPECT_TRUE(env.step(&right, rng, seen).terminated);
+  for (const double cell : {-1.0, 0.5, 3.0, 15.0, 25.0, 1e300}) {
+    EXPECT_EQ(errorOf([&] {
+                env.setState({cell, 0});
+              }),
+              "a state of gridworld is in cell " + formatNumber(cell) +
+                  ", which the grid does not have.");
+  }
+}
+
 // the family as a program sets it up
 struct Family {
   GridworldFamily family;

@@ -218,7 +218,7 @@ TEST(Experiment, LearnersOfAllTasksShareOneLayout) {
 }
 
 TEST(Experiment, DescribeListsEveryKeyWithItsMeaning) {
-  const std::string text = Experiment::describe("gridworld");
+  const std::string text = Experiment::describe("gridworld", "q_learning");
   for (const std::string word :
        {"personal.lambda", "strength of the pull", "environment.landmark", "aggregation.beta"}) {
     EXPECT_NE(text.find(word), std::string::npos) << word;

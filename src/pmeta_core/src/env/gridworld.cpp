@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/env/task_values.h"
 
 namespace pmeta {
 namespace {
@@ -62,6 +63,23 @@ Step Gridworld::step(const double* action, Rng& rng, double* observation) {
   return {outcome.reward, outcome.terminated, !outcome.terminated && steps_ >= spec_.horizon};
 }
 
+std::vector<double> Gridworld::state() const {
+  return {static_cast<double>(state_), static_cast<double>(steps_)};
+}
+
+void Gridworld::setState(const std::vector<double>& state) {
+  requireState(spec_, state, 2);
+  const double cell = state[0];
+  if (cell != std::floor(cell) || cell < 0 || cell >= numStates() ||
+      static_cast<int>(cell) / stride_ >= task_.size ||
+      static_cast<int>(cell) % stride_ >= task_.size) {
+    throw Error("a state of gridworld is in cell " + formatNumber(cell) +
+                ", which the grid does not have.");
+  }
+  state_ = static_cast<int>(cell);
+  steps_ = static_cast<int>(state[1]);
+}
+
 const std::vector<Outcome>& Gridworld::outcomes(int state, int action) const {
   return outcomes_[static_cast<std::size_t>(state) * kNumMoves + action];
 }
@@ -87,16 +105,13 @@ void GridworldFamily::bind(Settings& settings) {
 }
 
 void GridworldFamily::build(std::uint64_t seed) {
-  if (slip_.size() != 1 && slip_.size() != sizes_.size()) {
-    throw Error("environment.slip has " + std::to_string(slip_.size()) + " values for " +
-                std::to_string(sizes_.size()) + " tasks: give one, or one for each task.");
-  }
+  requireTaskValues("environment.slip", slip_, sizes_.size());
   tasks_.clear();
   stride_ = *std::max_element(sizes_.begin(), sizes_.end());
   for (std::size_t i = 0; i < sizes_.size(); ++i) {
     GridworldTask task;
     task.size = sizes_[i];
-    task.slip = slip_[slip_.size() == 1 ? 0 : i];
+    task.slip = taskValue(slip_, i);
     if (landmark_ == "corner") {
       task.landmark_row = task.landmark_column = task.size - 1;
     } else if (landmark_ == "centre") {

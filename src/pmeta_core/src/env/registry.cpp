@@ -2,8 +2,10 @@
 #include <map>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/env/cart_pole.h"
 #include "pmeta_core/env/env.h"
 #include "pmeta_core/env/gridworld.h"
+#include "pmeta_core/env/mountain_car.h"
 
 namespace pmeta {
 namespace {
@@ -13,7 +15,9 @@ using Factory = std::function<std::unique_ptr<EnvFamily>()>;
 // every environment family of the suite; a new one adds its line here
 const std::map<std::string, Factory>& families() {
   static const std::map<std::string, Factory> kFamilies = {
+      {"cart_pole", [] { return std::make_unique<CartPoleFamily>(); }},
       {"gridworld", [] { return std::make_unique<GridworldFamily>(); }},
+      {"mountain_car", [] { return std::make_unique<MountainCarFamily>(); }},
   };
   return kFamilies;
 }

@@ -18,6 +18,16 @@ Model ownedModel(const ModelLayout& layout, const TabularEnv& env) {
 
 }  // namespace
 
+void bind(Settings& s, const std::string& prefix, QLearningSettings& q) {
+  s.bind(prefix + "gamma", q.gamma, "discount", Range::halfOpen(0, 1));
+  s.bind(prefix + "updates", q.updates, "K: batches before each auxiliary update",
+         Range::between(1, 1e6));
+  s.bind(prefix + "samples_per_entry", q.samples_per_entry,
+         "samples of a batch as a multiple of the entries the task owns",
+         Range{0, 1e6, true, false});
+  s.bind(prefix + "initial_value", q.initial_value, "Q at the start");
+}
+
 TabularPersonalLearner::TabularPersonalLearner(std::unique_ptr<TabularEnv> env,
                                                const QLearningSettings& q_learning,
                                                const PersonalSettings& personal)

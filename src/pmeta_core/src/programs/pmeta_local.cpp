@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/env/trajectory_check.h"
 #include "pmeta_core/run/local_runner.h"
 #include "pmeta_core/run/sweep.h"
 #include "pmeta_core/theory/convergence.h"
@@ -35,6 +36,9 @@ constexpr char kUsage[] =
   convergence CONFIG [key:=value ...]  measure the theory's statements on known models
   check CONFIG [key:=value ...]        check the settings and print the effective ones as YAML
   settings [ENVIRONMENT]               list every setting with its meaning
+  replay KIND FILE [--tasks FILE]      simulate recorded trajectories (CSV, also gzip) again and
+                                       compare. KIND: cartpole, mountaincar. The tasks are the
+                                       paper's unless a *_tasks.csv is given.
 
 CONFIG is a YAML file, e.g. config/gridworld.yaml. A key may be shortened to its last part where that
 is unambiguous (lambda for personal.lambda). Results go to results_dir, by default ~/.ros/pmeta.
@@ -47,6 +51,7 @@ void onSignal(int) { g_stop = true; }
 struct Arguments {
   std::vector<std::string> words;  ///< all that is neither an option nor ROS's own remapping
   std::string name;
+  std::string tasks;
   int jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
@@ -61,6 +66,8 @@ Arguments parseArguments(int argc, char** argv) {
     if (word.rfind("__", 0) == 0) continue;  // roslaunch adds __name:= and __log:=
     if (word == "--name") {
       arguments.name = value(i);
+    } else if (word == "--tasks") {
+      arguments.tasks = value(i);
     } else if (word == "--jobs") {
       const std::string jobs = value(i);
       arguments.jobs = std::atoi(jobs.c_str());
@@ -169,8 +176,9 @@ int check(Arguments arguments) {
 }
 
 int settings(const Arguments& arguments) {
-  std::cout << Experiment::describe(arguments.words.empty() ? "gridworld"
-                                                            : arguments.words.front());
+  const std::string environment = arguments.words.empty() ? "gridworld" : arguments.words[0];
+  const std::string learner = environment == "gridworld" ? "q_learning" : "dqn";
+  std::cout << Experiment::describe(environment, learner);
   return 0;
 }
 
@@ -192,6 +200,17 @@ int convergence(Arguments arguments) {
   return 0;
 }
 
+int replay(const Arguments& arguments) {
+  if (arguments.words.size() != 2) {
+    throw Error("replay needs the kind of trajectories (" + pmeta::join(pmeta::trajectoryKinds()) +
+                ") and one file, e.g. replay cartpole cartpole_traj.csv.");
+  }
+  const pmeta::TrajectoryReport report =
+      pmeta::checkTrajectories(arguments.words[0], arguments.words[1], arguments.tasks);
+  std::cout << pmeta::trajectoryTable(report) << std::flush;
+  return report.ok() ? 0 : 1;
+}
+
 int dispatch(int argc, char** argv) {
   const std::string command = argc > 1 ? argv[1] : "";
   const bool wants_help = std::any_of(argv + 1, argv + argc, [](const char* word) {
@@ -206,6 +225,7 @@ int dispatch(int argc, char** argv) {
   if (command == "convergence") return convergence(parseArguments(argc, argv));
   if (command == "check") return check(parseArguments(argc, argv));
   if (command == "settings") return settings(parseArguments(argc, argv));
+  if (command == "replay") return replay(parseArguments(argc, argv));
   std::cerr << (command.empty() ? "" : "unknown command '" + command + "'\n") << kUsage;
   return 2;
 }

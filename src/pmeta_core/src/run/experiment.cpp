@@ -11,6 +11,7 @@
 #include <fstream>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/personal/dqn_personal_learner.h"
 
 namespace pmeta {
 namespace {
@@ -29,25 +30,56 @@ std::string environmentVariable(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-// the family's own settings are known only once its name is
-std::string environmentName(const YAML::Node& root, const std::vector<std::string>& overrides) {
-  std::string name = ExperimentSettings().environment;
-  if (root["environment"] && root["environment"].IsMap() && root["environment"]["name"] &&
-      root["environment"]["name"].IsScalar()) {
-    name = root["environment"]["name"].Scalar();
+// what the file or an override says of a setting that decides which others there are; `fallback` if
+// neither does. The last one given counts; what is wrong with it is said when it is read in
+// earnest.
+std::string peek(const std::vector<YAML::Node>& files, const std::vector<std::string>& overrides,
+                 const std::string& section, const std::string& name, std::string fallback) {
+  for (const YAML::Node& file : files) {
+    const YAML::Node group = section.empty() ? file : file[section];
+    if (group && group.IsMap() && group[name] && group[name].IsScalar()) {
+      fallback = group[name].Scalar();
+    }
   }
+  const std::string full = section.empty() ? name : section + "." + name;
   for (const std::string& assignment : overrides) {
     const auto split = assignment.find(":=");
     const std::string key = assignment.substr(0, split);
-    if (split == std::string::npos || (key != "environment.name" && key != "name")) continue;
+    if (split == std::string::npos || (key != full && key != name)) continue;
     try {
       const YAML::Node value = YAML::Load(assignment.substr(split + 2));
-      if (value.IsScalar()) name = value.Scalar();
+      if (value.IsScalar()) fallback = value.Scalar();
     } catch (const YAML::Exception&) {
       // Settings::assign says what is wrong with it
     }
   }
-  return name;
+  return fallback;
+}
+
+// the file without its presets, then the chosen preset
+std::vector<YAML::Node> choosePreset(const YAML::Node& root, const std::string& source,
+                                     const std::vector<std::string>& overrides) {
+  YAML::Node base = YAML::Clone(root);
+  base.remove("presets");
+  const std::string chosen = peek({root}, overrides, "", "preset", "");
+  const YAML::Node presets = root["presets"];
+  // effective settings name the preset they came from, which is part of them already
+  if (chosen.empty() || (!presets && peek({root}, {}, "", "preset", "") == chosen)) return {base};
+  std::vector<std::string> known;
+  if (presets && presets.IsMap()) {
+    for (const auto& preset : presets) known.push_back(preset.first.Scalar());
+    if (presets[chosen]) return {base, presets[chosen]};
+  }
+  throw Error("unknown preset '" + chosen + "': " + source +
+              (known.empty() ? " has none." : " has " + join(known) + "."));
+}
+
+const std::vector<std::string> kLearners = {"q_learning", "dqn"};
+
+// six digits, so that a limit that is named is allowed
+std::string roundedDown(double value) {
+  const double scale = std::pow(10.0, 5 - std::floor(std::log10(value)));
+  return formatNumber(std::floor(value * scale) / scale);
 }
 
 }  // namespace
@@ -64,7 +96,9 @@ Experiment Experiment::parse(const std::string& text, const std::string& source,
 void Experiment::bind(Settings& s) {
   ExperimentSettings& e = settings_;
   s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
+  s.bind("preset", e.preset, "variant of the settings file; \"\" for none");
   s.bind("algorithm", e.algorithm, "what is trained", {"pmeta", "model_averaging", "independent"});
+  s.bind("learner", e.learner, "q_learning for tables, dqn for networks", kLearners);
   s.bind("seed", e.seed, "one seed, one result", Range::atLeast(0));
   s.bind("rounds", e.rounds, "C: how often the meta-policy is aggregated", Range::between(1, 1e6));
   s.bind("updates_per_round", e.updates_per_round, "R: personalised and auxiliary updates a round",
@@ -75,6 +109,10 @@ void Experiment::bind(Settings& s) {
          Range::between(0, 3600));
   s.bind("publish_trajectories", e.publish_trajectories,
          "publish evaluation episodes for the viewer; false: no observation leaves an agent");
+  s.bind("fresh_episodes", e.fresh_episodes,
+         "local runner: after the last round, evaluate the last and the best policies again, on so "
+         "many fresh episodes a task",
+         Range::between(0, 1e6));
 
   s.bind("personal.alpha", e.personal.alpha, "personalised learning rate", Range::above(0));
   s.bind("personal.lambda", e.personal.lambda,
@@ -83,13 +121,7 @@ void Experiment::bind(Settings& s) {
   s.bind("personal.personal_init", e.personal.personal_init,
          "personal parameters at a round's start: the meta-policy's, or kept", {"meta", "keep"});
 
-  s.bind("q_learning.gamma", e.q_learning.gamma, "discount", Range::halfOpen(0, 1));
-  s.bind("q_learning.updates", e.q_learning.updates, "K: batches before each auxiliary update",
-         Range::between(1, 1e6));
-  s.bind("q_learning.samples_per_entry", e.q_learning.samples_per_entry,
-         "samples of a batch as a multiple of the entries the task owns",
-         Range{0, 1e6, true, false});
-  s.bind("q_learning.initial_value", e.q_learning.initial_value, "Q at the start");
+  bindLearner(s);
 
   s.bind("aggregation.beta", e.aggregation.beta, "mixing: meta <- (1 - beta) meta + beta mean",
          Range::between(0, 1));
@@ -102,14 +134,28 @@ void Experiment::bind(Settings& s) {
   family_->bind(s);
 }
 
+void Experiment::bindLearner(Settings& s) {
+  ExperimentSettings& e = settings_;
+  if (e.learner != "dqn") return pmeta::bind(s, "q_learning.", e.q_learning);
+  s.bind("personal.learning_rate", e.personal.learning_rate, "Adam's learning rate",
+         Range::above(0));
+  s.bind("personal.proximal", e.personal.proximal,
+         "the pull after Adam's step, or in the gradient that Adam gets", {"decoupled", "coupled"});
+  pmeta::bind(s, "dqn.", e.dqn);
+}
+
 Experiment Experiment::build(const YAML::Node& root, const std::string& source,
                              const std::vector<std::string>& overrides) {
+  const std::vector<YAML::Node> files = choosePreset(root, source, overrides);
   Experiment experiment;
-  experiment.family_ = makeEnvFamily(environmentName(root, overrides));
+  experiment.settings_.learner =
+      peek(files, overrides, "", "learner", experiment.settings_.learner);
+  experiment.family_ = makeEnvFamily(
+      peek(files, overrides, "environment", "name", experiment.settings_.environment));
 
   Settings settings;
   experiment.bind(settings);
-  settings.read(root, source);
+  for (const YAML::Node& file : files) settings.read(file, source);
   for (const std::string& assignment : overrides) settings.assign(assignment);
 
   ExperimentSettings& e = experiment.settings_;
@@ -132,8 +178,9 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   return experiment;
 }
 
-std::string Experiment::describe(const std::string& environment) {
+std::string Experiment::describe(const std::string& environment, const std::string& learner) {
   Experiment experiment;
+  experiment.settings_.learner = learner;
   experiment.family_ = makeEnvFamily(environment);
   Settings settings;
   experiment.bind(settings);
@@ -159,24 +206,25 @@ void Experiment::applyAlgorithm() {
 
 void Experiment::checkStability() {
   const PersonalSettings& p = settings_.personal;
-  const double gamma = settings_.q_learning.gamma;
-  // with frozen auxiliary parameters the update is a linear map that blows up beyond these
-  const double alpha_limit = 2 / (1 + p.lambda + gamma);
-  if (p.alpha >= alpha_limit) {
-    // six digits, rounded down so that what is named is allowed
-    const double scale = std::pow(10.0, 5 - std::floor(std::log10(alpha_limit)));
-    throw Error("personal.alpha = " + formatNumber(p.alpha) +
-                " with personal.lambda = " + formatNumber(p.lambda) +
-                " diverges: alpha must be below 2 / (1 + lambda + gamma) = " +
-                formatNumber(std::floor(alpha_limit * scale) / scale) + ".");
+  const bool tabular = settings_.learner == "q_learning";
+  // with frozen auxiliary parameters the update is a linear map that blows up beyond these; of a
+  // network only the pull is linear
+  const double own = tabular ? 1 + settings_.q_learning.gamma : 0;
+  const std::string formula = tabular ? "2 / (1 + lambda + gamma)" : "2 / lambda";
+  if (p.alpha * (own + p.lambda) >= 2) {
+    throw Error("personal.alpha = " + formatNumber(p.alpha) + " with personal.lambda = " +
+                formatNumber(p.lambda) + " diverges: alpha must be below " + formula + " = " +
+                roundedDown(2 / (own + p.lambda)) + ".");
   }
   if (p.eta * p.lambda >= 2) {
     throw Error("personal.eta = " + formatNumber(p.eta) +
                 " with personal.lambda = " + formatNumber(p.lambda) +
                 " diverges: eta must be below 2 / lambda = " + formatNumber(2 / p.lambda) + ".");
   }
-  if (p.alpha * (1 + p.lambda) > 1) {
-    notes_.push_back("warning: alpha * (1 + lambda) = " + formatNumber(p.alpha * (1 + p.lambda)) +
+  const double overshoot = p.alpha * ((tabular ? 1 : 0) + p.lambda);
+  if (overshoot > 1) {
+    notes_.push_back("warning: alpha * " + std::string(tabular ? "(1 + lambda)" : "lambda") +
+                     " = " + formatNumber(overshoot) +
                      " is above 1: the personalised update overshoots.");
   }
   if (p.eta * p.lambda > 1) {
@@ -190,15 +238,27 @@ int Experiment::quorum() const {
 }
 
 std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
+  const ExperimentSettings& e = settings_;
+  if (e.learner == "dqn") {
+    ProximalAdamSettings optimizer;
+    optimizer.learning_rate = e.personal.learning_rate;
+    optimizer.alpha = e.personal.alpha;
+    optimizer.lambda = e.personal.lambda;
+    optimizer.eta = e.personal.eta;
+    optimizer.coupled = e.personal.proximal == "coupled";
+    return std::make_unique<DqnPersonalLearner>(
+        [family = family_, task] { return family->make(task); }, e.dqn, optimizer,
+        static_cast<std::int64_t>(e.rounds) * e.updates_per_round);
+  }
   std::unique_ptr<Env> env = family_->make(task);
   auto* tabular = dynamic_cast<TabularEnv*>(env.get());
   if (tabular == nullptr) {
-    throw Error("environment '" + settings_.environment +
-                "' is not tabular: q_learning cannot learn it.");
+    throw Error("environment '" + e.environment +
+                "' is not tabular, so q_learning cannot learn it: choose learner:=dqn.");
   }
   env.release();
   return std::make_unique<TabularPersonalLearner>(std::unique_ptr<TabularEnv>(tabular),
-                                                  settings_.q_learning, settings_.personal);
+                                                  e.q_learning, e.personal);
 }
 
 std::optional<double> Experiment::optimalReturn(int task) const {

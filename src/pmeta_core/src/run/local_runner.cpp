@@ -12,6 +12,8 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
   std::vector<TaskAgent> agents;
   for (int task = 0; task < experiment.numTasks(); ++task) agents.emplace_back(experiment, task);
 
+  const int fresh_episodes = experiment.settings().fresh_episodes;
+  FreshEvaluation fresh;
   LocalResult result;
   for (int round = 1; round <= experiment.settings().rounds && !result.stopped; ++round) {
     const auto start = std::chrono::steady_clock::now();
@@ -29,11 +31,18 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
       if (experiment.evaluatesMeta()) book.add(agent.evaluateMeta(aggregator.metaPolicy()));
     }
     for (RoundBook::Round& done : book.take()) {
+      if (fresh_episodes > 0) fresh.offer(done.summary, agents, aggregator.metaPolicy());
       if (log != nullptr) log->write(done);
       if (on_round && !on_round(done.summary)) {
         result.stopped = round < experiment.settings().rounds;
       }
       result.rounds.push_back(std::move(done));
+    }
+  }
+  if (fresh_episodes > 0 && !result.stopped) {
+    result.fresh = fresh.evaluate(agents, fresh_episodes, !experiment.evaluatesMeta());
+    if (log != nullptr) {
+      writeFileAtomically(log->dir() + "/final.csv", FreshEvaluation::csv(result.fresh));
     }
   }
   result.meta = aggregator.metaPolicy().model;

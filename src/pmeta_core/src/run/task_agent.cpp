@@ -1,6 +1,8 @@
 #include "pmeta_core/run/task_agent.h"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 
 namespace pmeta {
 namespace {
@@ -64,6 +66,22 @@ TaskReturn TaskAgent::evaluateMeta(const MetaPolicy& meta) const {
   result.policy = Policy::kMeta;
   result.seconds = watch.seconds();
   return result;
+}
+
+ReturnStats TaskAgent::evaluateFresh(const Model& policy, int episodes) const {
+  ReturnStats total;
+  double mean_of_squares = 0;
+  for (std::uint64_t batch = 1; total.episodes < episodes; ++batch) {
+    // rounds evaluate with round 0 of this stream
+    Rng rng(seed_, task_, Stream::kEvaluate, batch);
+    const ReturnStats stats = learner_->evaluate(policy, rng);
+    const double share = static_cast<double>(stats.episodes) / (total.episodes + stats.episodes);
+    total.mean += share * (stats.mean - total.mean);
+    mean_of_squares += share * (stats.mean * stats.mean + stats.std * stats.std - mean_of_squares);
+    total.episodes += stats.episodes;
+  }
+  total.std = std::sqrt(std::max(0.0, mean_of_squares - total.mean * total.mean));
+  return total;
 }
 
 Episode TaskAgent::recordPersonal() const {

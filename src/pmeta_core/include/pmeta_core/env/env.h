@@ -37,7 +37,18 @@ class Env {
 
   /// Acts once. A discrete action a is passed as action[0] == a.
   virtual Step step(const double* action, Rng& rng, double* observation) = 0;
+
+  /// All that the next step depends on, for checkpoints and recorded trajectories; the last number
+  /// is the count of steps since the reset. Throws Error where an environment does not offer it.
+  virtual std::vector<double> state() const;
+
+  /// Goes on from a state() of the same task. Throws Error if `state` cannot be one.
+  virtual void setState(const std::vector<double>& state);
 };
+
+/// Throws Error unless `state` holds `size` finite numbers of which the last counts steps; for
+/// Env::setState.
+void requireState(const EnvSpec& spec, const std::vector<double>& state, std::size_t size);
 
 /// A family of MDPs, the tasks of one experiment: its settings, and the tasks that follow from
 /// them.

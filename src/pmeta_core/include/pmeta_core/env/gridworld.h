@@ -31,6 +31,8 @@ class Gridworld : public TabularEnv {
   const EnvSpec& spec() const override { return spec_; }
   void reset(Rng& rng, double* observation) override;
   Step step(const double* action, Rng& rng, double* observation) override;
+  std::vector<double> state() const override;  ///< index of the cell, steps
+  void setState(const std::vector<double>& state) override;
 
   int numStates() const override { return stride_ * stride_; }
   const std::vector<int>& ownedStates() const override { return owned_states_; }

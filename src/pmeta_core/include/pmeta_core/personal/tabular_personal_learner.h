@@ -1,7 +1,9 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
+#include "pmeta_core/base/settings.h"
 #include "pmeta_core/learn/q_learner.h"
 #include "pmeta_core/personal/personal_learner.h"
 #include "pmeta_core/personal/proximal_sgd.h"
@@ -15,6 +17,9 @@ struct QLearningSettings {
   double samples_per_entry = 2;  ///< n_i of one batch as a multiple of the entries the task owns
   double initial_value = 0;      ///< Q at the start
 };
+
+/// Binds all of them below `prefix`, e.g. "q_learning.".
+void bind(Settings& settings, const std::string& prefix, QLearningSettings& q_learning);
 
 /// pMeta-RL on a Q-table: personalised step on sampled entries, auxiliary step on the whole table.
 class TabularPersonalLearner : public PersonalLearner {

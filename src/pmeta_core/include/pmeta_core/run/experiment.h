@@ -9,6 +9,7 @@
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/env/env.h"
+#include "pmeta_core/learn/dqn.h"
 #include "pmeta_core/personal/personal_learner.h"
 #include "pmeta_core/personal/tabular_personal_learner.h"
 
@@ -24,7 +25,9 @@ struct AggregationSettings {
 /// Everything that defines a run, with defaults.
 struct ExperimentSettings {
   std::string experiment = "experiment";
-  std::string algorithm = "pmeta";  ///< pmeta, model_averaging or independent
+  std::string preset;                  ///< which of the file's presets; "" for none
+  std::string algorithm = "pmeta";     ///< pmeta, model_averaging or independent
+  std::string learner = "q_learning";  ///< q_learning (tables) or dqn (networks)
   std::int64_t seed = 0;
   int rounds = 10;            ///< C
   int updates_per_round = 3;  ///< R
@@ -32,13 +35,19 @@ struct ExperimentSettings {
   std::string run_id;         ///< "" means one made of the start time, algorithm and seed
   double pace = 0;            ///< least seconds between rounds, to watch a fast experiment
   bool publish_trajectories = true;
+  int fresh_episodes = 0;  ///< local runner: episodes of the evaluation after the last round
   PersonalSettings personal;
-  QLearningSettings q_learning;
+  QLearningSettings q_learning;  ///< with learner q_learning
+  DqnSettings dqn;               ///< with learner dqn
   AggregationSettings aggregation;
   std::string environment = "gridworld";
 };
 
 /// A checked experiment: its settings, its tasks, and what each party needs of them.
+///
+/// A settings file may hold named variants, `presets: {paper: {...}, ...}`; `preset: paper` reads
+/// that one over the rest. What is read of a file depends on `learner` and `environment.name`:
+/// settings of others are unknown keys.
 ///
 /// The three algorithms are settings, not code paths of their own:
 ///   pmeta            personal pull lambda, agents send auxiliary parameters
@@ -75,7 +84,7 @@ class Experiment {
   /// The same as a table for people.
   const std::string& table() const { return table_; }
   /// All keys with meanings, for --help.
-  static std::string describe(const std::string& environment);
+  static std::string describe(const std::string& environment, const std::string& learner);
   /// Notes and warnings about the settings, one sentence each.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -84,6 +93,7 @@ class Experiment {
   static Experiment build(const YAML::Node& root, const std::string& source,
                           const std::vector<std::string>& overrides);
   void bind(Settings& settings);
+  void bindLearner(Settings& settings);
   void applyAlgorithm();
   void checkStability();
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pmeta_core/run/experiment.h"
+#include "pmeta_core/run/fresh_evaluation.h"
 #include "pmeta_core/run/meta_aggregator.h"
 #include "pmeta_core/run/run_log.h"
 #include "pmeta_core/run/task_agent.h"
@@ -15,7 +16,8 @@ namespace pmeta {
 struct LocalResult {
   bool stopped = false;  ///< before the last round
   std::vector<RoundBook::Round> rounds;
-  Model meta;  ///< the last meta-policy
+  Model meta;                      ///< the last meta-policy
+  std::vector<FreshReturn> fresh;  ///< with fresh_episodes: the kept policies on fresh episodes
 };
 
 /// Called after each round; false stops the run.

@@ -35,6 +35,11 @@ class TaskAgent {
   /// The meta-policy on this task.
   TaskReturn evaluateMeta(const MetaPolicy& meta) const;
 
+  /// A policy on this task, on at least `episodes` episodes that no round evaluates.
+  ReturnStats evaluateFresh(const Model& policy, int episodes) const;
+
+  const Model& personal() const { return learner_->personal(); }
+
   /// One greedy episode, from the same start whatever the policy and round.
   Episode recordPersonal() const;
   Episode recordMeta(const MetaPolicy& meta) const;

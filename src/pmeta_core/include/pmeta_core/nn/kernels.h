@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace pmeta {
+
+/// Numbers of one fused optimiser pass. Unused ones are ignored.
+struct AdamPass {
+  float step_size = 0;        ///< learning rate / (1 - beta1^t)
+  float beta1 = 0.9f;         ///< decay of the first moment
+  float beta2 = 0.999f;       ///< decay of the second moment
+  float one_minus_beta1 = 0;  ///< rounded from double, as torch does
+  float one_minus_beta2 = 0;  ///< rounded from double, as torch does
+  float root_correction = 1;  ///< 1 / sqrt(1 - beta2^t)
+  float eps = 1e-8f;          ///< added outside the square root
+  float pull = 0;             ///< decoupled: alpha * lambda; coupled: lambda
+  float follow = 0;           ///< eta * lambda
+  bool coupled = false;       ///< the pull is added to the gradient before Adam
+  float tau = 0;              ///< Polyak step of the target
+};
+
+/// The loops that are not matrix products, compiled for one instruction set.
+///
+/// Matrices are row-major and dense. Pointers need no alignment; those of one call must not
+/// overlap. No table contracts into fused multiply-adds and all sum in one order, so that every
+/// table gives the same bits.
+struct Kernels {
+  const char* name;  ///< "x86-64-v4", "x86-64-v3" or "default"
+
+  /// y[r][c] <- y[r][c] + bias[c].
+  void (*addBias)(float* y, const float* bias, std::size_t rows, std::size_t columns);
+
+  /// y[r][c] <- max(0, y[r][c] + bias[c]). NaN stays NaN, so that divergence shows.
+  void (*addBiasRelu)(float* y, const float* bias, std::size_t rows, std::size_t columns);
+
+  /// y <- x W^T + bias for few rows or few outputs: x is [rows, inputs], W [outputs, inputs] and y
+  /// [rows, outputs]; max(0, .) of it where `relu`. Reads W once for every row.
+  void (*affine)(const float* x, const float* weight, const float* bias, float* y, std::size_t rows,
+                 std::size_t inputs, std::size_t outputs, bool relu);
+
+  /// d[k] <- activation[k] <= 0 ? 0 : d[k], where `activation` is the ReLU's output.
+  void (*maskRelu)(float* d, const float* activation, std::size_t n);
+
+  /// sums[c] <- sum over r of x[r][c]: a bias gradient.
+  void (*columnSums)(const float* x, float* sums, std::size_t rows, std::size_t columns);
+
+  /// Squared loss, mean_k w_k e_k^2: writes its gradient 2 w_k e_k / n and returns the loss.
+  /// `weight` may be null: all one.
+  float (*squaredLoss)(const float* error, const float* weight, float* gradient, std::size_t n);
+
+  /// Huber loss, mean_k w_k h(e_k) with h(e) = e^2 / 2 where |e| <= delta, else
+  /// delta (|e| - delta / 2): writes its gradient w_k clamp(e_k, -delta, delta) / n and returns the
+  /// loss. `weight` may be null: all one.
+  float (*huberLoss)(const float* error, const float* weight, float delta, float* gradient,
+                     std::size_t n);
+
+  /// One pass over n parameters:
+  ///
+  ///     g      <- gradient + (coupled) lambda (phi - omega)
+  ///     m      <- beta1 m + (1 - beta1) g,  v <- beta2 v + (1 - beta2) g^2
+  ///     phi'   <- phi - step_size m / (sqrt(v) root_correction + eps)
+  ///     phi'   <- phi' - (decoupled) alpha lambda (phi' - omega)     with the old omega
+  ///     omega  <- omega + eta lambda (phi' - omega)                  with the new phi
+  ///     target <- target + tau (phi' - target)
+  ///
+  /// `omega` and `target` may be null: their lines are left out. Moments below 1e-30 and 1e-36
+  /// become 0, since denormals cost a hundred cycles each and move nothing.
+  void (*adam)(const AdamPass& pass, float* phi, float* m, float* v, const float* gradient,
+               float* omega, float* target, std::size_t n);
+};
+
+/// The fastest table of this machine, or the one setKernels() chose.
+const Kernels& kernels();
+
+/// Tables this machine can run, fastest first. The last one is always "default".
+std::vector<std::string> kernelNames();
+
+/// Makes kernels() return the table `name`, for tests and benchmarks. Throws Error on a name that
+/// is not in kernelNames().
+void setKernels(const std::string& name);
+
+}  // namespace pmeta

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "pmeta_core/learn/optimizer.h"
+#include "pmeta_core/nn/aligned.h"
+
+namespace pmeta {
+
+/// Settings of ProximalAdam. Adam's are torch.optim.Adam's.
+struct ProximalAdamSettings {
+  double learning_rate = 1e-3;  ///< positive
+  double beta1 = 0.9;           ///< in [0, 1)
+  double beta2 = 0.999;         ///< in [0, 1)
+  double eps = 1e-8;            ///< positive
+  double alpha = 1e-3;          ///< step size of the pull, at least 0
+  double lambda = 0;            ///< strength of the pull, at least 0; at 0 this is plain Adam
+  double eta = 1e-3;            ///< step size of the auxiliary parameters, at least 0
+  /// Adds lambda (phi - omega) to the gradient, so that Adam rescales the pull as well. With a
+  /// slow auxiliary (eta 1e-3) networks hardly learn with it; it is there to be compared with.
+  bool coupled = false;
+};
+
+/// Adam (Kingma and Ba, 2015) that also pulls the personal parameters phi towards the auxiliary
+/// ones omega, and moves those after them, in one pass over memory:
+///
+///     phi   <- Adam(phi, gradient)
+///     phi   <- phi - alpha * lambda * (phi - omega)      with the old omega: eq. (per_update0)
+///     omega <- omega + eta * lambda * (phi - omega)      with the new phi: eq. (local_update0)
+///
+/// The pull has a step of its own, decoupled from Adam's, since Adam would take its size away.
+/// Moments and the count of updates stay when a round resets phi and omega.
+class ProximalAdam : public Optimizer<float> {
+ public:
+  /// `personal` and `auxiliary`: `size` floats each, which must outlive the optimiser. `auxiliary`
+  /// may be null: plain Adam. Throws Error if a setting is out of its range.
+  ProximalAdam(float* personal, float* auxiliary, std::size_t size,
+               const ProximalAdamSettings& settings);
+
+  /// Also moves `target` (null: no more) by target <- target + tau * (phi - target) in every
+  /// apply(). tau in (0, 1].
+  void followWith(float* target, double tau);
+
+  /// Counts one update. Call it once before the apply() calls that make up an update: Adam's bias
+  /// correction goes by this count.
+  void beginUpdate();
+
+  /// The update of parameters [offset, offset + n). In one update each parameter has its turn once.
+  /// Throws Error if no update has begun.
+  void apply(std::size_t offset, const float* gradient, std::size_t n) override;
+
+  const ProximalAdamSettings& settings() const { return settings_; }
+  std::size_t size() const { return first_moment_.size(); }
+
+  /// Adam's state, for checkpoints.
+  std::uint64_t updates() const { return updates_; }
+  const AlignedFloats& firstMoment() const { return first_moment_; }
+  const AlignedFloats& secondMoment() const { return second_moment_; }
+  /// Takes a state back. Throws Error if the moments are not size() floats each.
+  void restore(std::uint64_t updates, const AlignedFloats& first_moment,
+               const AlignedFloats& second_moment);
+
+ private:
+  float* personal_;
+  float* auxiliary_;
+  float* target_ = nullptr;
+  ProximalAdamSettings settings_;
+  double tau_ = 0;
+  std::uint64_t updates_ = 0;
+  AlignedFloats first_moment_, second_moment_;
+};
+
+}  // namespace pmeta

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace pmeta {
+
+/// Weights with their running sums in a binary tree: a weight is set, and a prefix sum searched, in
+/// O(log capacity) (Schaul et al., "Prioritized Experience Replay", ICLR 2016, appendix B.2.1).
+///
+/// Each sum is computed anew from its two children, so that rounding does not build up.
+class SumTree {
+ public:
+  /// All weights 0. capacity: number of leaves, at least 1.
+  explicit SumTree(std::size_t capacity);
+
+  std::size_t capacity() const { return capacity_; }
+  double total() const { return sums_[1]; }
+  double get(std::size_t leaf) const { return sums_[leaves_ + leaf]; }
+
+  /// weight: finite, at least 0.
+  void set(std::size_t leaf, double weight);
+
+  /// The leaf whose weight covers `prefix` in [0, total()): the sums before it are at most
+  /// `prefix`, the sums up to and with it above. Never a leaf of weight 0 unless all are.
+  std::size_t find(double prefix) const;
+
+ private:
+  std::size_t capacity_;
+  std::size_t leaves_ = 1;    // capacity rounded up to a power of two
+  std::vector<double> sums_;  // node k over nodes 2k and 2k + 1; the root is node 1
+};
+
+}  // namespace pmeta

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/run/protocol.h"
+#include "pmeta_core/run/task_agent.h"
+
+namespace pmeta {
+
+/// One line of final.csv: a kept policy on one task, on episodes that chose nothing.
+struct FreshReturn {
+  std::string snapshot;  ///< "last" or "best"
+  int round = 0;         ///< the round it is from
+  Policy policy = Policy::kPersonal;
+  int trained_task = -1;  ///< whose personal policy; -1 for the meta-policy
+  int task = 0;           ///< where it is evaluated
+  ReturnStats stats;
+};
+
+/// Keeps the policies of the last and of the best round, and evaluates them on fresh episodes.
+///
+/// The best round of a run is a maximum over noisy evaluations, so its return is biased upwards;
+/// the same policies on fresh episodes are not. Personal policies compete by their mean over tasks
+/// (PP), meta-policies by theirs (MP).
+class FreshEvaluation {
+ public:
+  /// A round is complete: its summary, the agents as they are, and the meta-policy it gave.
+  void offer(const RoundSummary& summary, const std::vector<TaskAgent>& agents,
+             const MetaPolicy& meta);
+
+  /// Every kept policy on at least `episodes` episodes a task. `cross`: personal policies on the
+  /// other tasks too.
+  std::vector<FreshReturn> evaluate(const std::vector<TaskAgent>& agents, int episodes,
+                                    bool cross) const;
+
+  /// The rows as CSV, with a header.
+  static std::string csv(const std::vector<FreshReturn>& rows);
+
+ private:
+  struct Kept {
+    int round = 0;
+    double value = -std::numeric_limits<double>::infinity();
+    std::vector<Model> models;
+  };
+  Kept last_personal_, best_personal_, last_meta_, best_meta_;
+};
+
+}  // namespace pmeta

@@ -1,0 +1,34 @@
+#include "pmeta_core/env/env.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pmeta_core/base/error.h"
+
+namespace pmeta {
+
+std::vector<double> Env::state() const {
+  throw Error("environment '" + spec().name + "' cannot hand out its state.");
+}
+
+void Env::setState(const std::vector<double>&) {
+  throw Error("environment '" + spec().name + "' cannot take up a state.");
+}
+
+void requireState(const EnvSpec& spec, const std::vector<double>& state, std::size_t size) {
+  if (state.size() != size) {
+    throw Error("a state of " + spec.name + " has " + std::to_string(state.size()) +
+                " numbers but must have " + std::to_string(size) + ".");
+  }
+  if (!std::all_of(state.begin(), state.end(), [](double x) { return std::isfinite(x); })) {
+    throw Error("a state of " + spec.name + " holds a number that is not finite.");
+  }
+  const double steps = state.back();
+  if (steps != std::floor(steps) || steps < 0 || steps > std::numeric_limits<int>::max()) {
+    throw Error("a state of " + spec.name + " counts " + formatNumber(steps) +
+                " steps, which is not a count.");
+  }
+}
+
+}  // namespace pmeta

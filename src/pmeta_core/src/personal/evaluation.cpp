@@ -1,0 +1,78 @@
+#include "pmeta_core/personal/evaluation.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pmeta {
+
+Evaluation::Evaluation(std::vector<std::unique_ptr<Env>> envs)
+    : envs_(std::move(envs)),
+      observation_size_(static_cast<std::size_t>(envs_.front()->spec().observation_size)),
+      action_size_(static_cast<std::size_t>(envs_.front()->spec().action_size)),
+      running_(envs_.size()),
+      returns_(envs_.size()),
+      observation_(observation_size_),
+      observations_(envs_.size() * observation_size_),
+      actions_(envs_.size() * action_size_) {}
+
+ReturnStats Evaluation::run(const BatchPolicy& policy, Rng& rng) {
+  running_.resize(envs_.size());
+  for (std::size_t i = 0; i < envs_.size(); ++i) {
+    running_[i] = i;
+    returns_[i] = 0;
+    envs_[i]->reset(rng, observation_.data());
+    std::copy(observation_.begin(), observation_.end(), &observations_[i * observation_size_]);
+  }
+  while (!running_.empty()) {
+    policy(observations_.data(), static_cast<int>(running_.size()), actions_.data());
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < running_.size(); ++k) {
+      const std::size_t i = running_[k];
+      const Step step = envs_[i]->step(&actions_[k * action_size_], rng, observation_.data());
+      returns_[i] += step.reward;
+      if (step.terminated || step.truncated) continue;
+      // close up: kept <= k, so nothing unread is overwritten
+      running_[kept] = i;
+      std::copy(observation_.begin(), observation_.end(), &observations_[kept * observation_size_]);
+      ++kept;
+    }
+    running_.resize(kept);
+  }
+
+  ReturnStats stats;
+  stats.episodes = static_cast<int>(returns_.size());
+  for (const double value : returns_) stats.mean += value;
+  stats.mean /= stats.episodes;
+  double squares = 0;
+  for (const double value : returns_) squares += (value - stats.mean) * (value - stats.mean);
+  stats.std = std::sqrt(squares / stats.episodes);
+  return stats;
+}
+
+Episode Evaluation::record(const BatchPolicy& policy, Rng& rng) {
+  Episode episode;
+  episode.observation_size = static_cast<int>(observation_size_);
+  episode.action_size = static_cast<int>(action_size_);
+  const auto keep = [&] {
+    episode.observations.insert(episode.observations.end(), observation_.begin(),
+                                observation_.end());
+    std::copy(observation_.begin(), observation_.end(), observations_.begin());
+  };
+
+  Env& env = *envs_.front();
+  env.reset(rng, observation_.data());
+  keep();
+  while (!episode.terminated && !episode.truncated) {
+    policy(observations_.data(), 1, actions_.data());
+    const Step step = env.step(actions_.data(), rng, observation_.data());
+    keep();
+    episode.actions.insert(episode.actions.end(), actions_.begin(),
+                           actions_.begin() + static_cast<std::ptrdiff_t>(action_size_));
+    episode.rewards.push_back(step.reward);
+    episode.terminated = step.terminated;
+    episode.truncated = step.truncated;
+  }
+  return episode;
+}
+
+}  // namespace pmeta

@@ -1,0 +1,79 @@
+#include "pmeta_core/personal/proximal_adam.h"
+
+#include <cmath>
+#include <sstream>
+
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/nn/kernels.h"
+
+namespace pmeta {
+namespace {
+
+void require(bool holds, const char* name, double value, const char* range) {
+  if (holds) return;
+  std::ostringstream text;
+  text << "Adam's " << name << " is " << value << ", but must be " << range << ".";
+  throw Error(text.str());
+}
+
+}  // namespace
+
+ProximalAdam::ProximalAdam(float* personal, float* auxiliary, std::size_t size,
+                           const ProximalAdamSettings& settings)
+    : personal_(personal),
+      auxiliary_(settings.lambda == 0 ? nullptr : auxiliary),
+      settings_(settings),
+      first_moment_(size),
+      second_moment_(size) {
+  const ProximalAdamSettings& s = settings_;
+  require(s.learning_rate > 0, "learning_rate", s.learning_rate, "positive");
+  require(s.beta1 >= 0 && s.beta1 < 1, "beta1", s.beta1, "in [0, 1)");
+  require(s.beta2 >= 0 && s.beta2 < 1, "beta2", s.beta2, "in [0, 1)");
+  require(s.eps > 0, "eps", s.eps, "positive");
+  require(s.alpha >= 0, "alpha", s.alpha, "at least 0");
+  require(s.lambda >= 0, "lambda", s.lambda, "at least 0");
+  require(s.eta >= 0, "eta", s.eta, "at least 0");
+}
+
+void ProximalAdam::followWith(float* target, double tau) {
+  require(target == nullptr || (tau > 0 && tau <= 1), "tau", tau, "in (0, 1]");
+  target_ = target;
+  tau_ = tau;
+}
+
+void ProximalAdam::beginUpdate() { ++updates_; }
+
+void ProximalAdam::apply(std::size_t offset, const float* gradient, std::size_t n) {
+  if (updates_ == 0) throw Error("call beginUpdate() before Adam's apply().");
+  const ProximalAdamSettings& s = settings_;
+  const auto t = static_cast<double>(updates_);
+  AdamPass pass;
+  pass.step_size = static_cast<float>(s.learning_rate / (1 - std::pow(s.beta1, t)));
+  pass.beta1 = static_cast<float>(s.beta1);
+  pass.beta2 = static_cast<float>(s.beta2);
+  pass.one_minus_beta1 = static_cast<float>(1 - s.beta1);
+  pass.one_minus_beta2 = static_cast<float>(1 - s.beta2);
+  pass.root_correction = static_cast<float>(1 / std::sqrt(1 - std::pow(s.beta2, t)));
+  pass.eps = static_cast<float>(s.eps);
+  pass.pull = static_cast<float>(s.coupled ? s.lambda : s.alpha * s.lambda);
+  pass.follow = static_cast<float>(s.eta * s.lambda);
+  pass.coupled = s.coupled;
+  pass.tau = static_cast<float>(tau_);
+  const auto at = [offset](float* p) { return p == nullptr ? nullptr : p + offset; };
+  kernels().adam(pass, personal_ + offset, first_moment_.data() + offset,
+                 second_moment_.data() + offset, gradient, at(auxiliary_), at(target_), n);
+}
+
+void ProximalAdam::restore(std::uint64_t updates, const AlignedFloats& first_moment,
+                           const AlignedFloats& second_moment) {
+  if (first_moment.size() != size() || second_moment.size() != size()) {
+    throw Error("Adam has moments of " + std::to_string(size()) + " parameters, not of " +
+                std::to_string(first_moment.size()) + " and " +
+                std::to_string(second_moment.size()) + ".");
+  }
+  updates_ = updates;
+  first_moment_ = first_moment;
+  second_moment_ = second_moment;
+}
+
+}  // namespace pmeta

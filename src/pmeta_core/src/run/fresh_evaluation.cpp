@@ -1,0 +1,58 @@
+#include "pmeta_core/run/fresh_evaluation.h"
+
+#include "pmeta_core/base/settings.h"
+
+namespace pmeta {
+
+void FreshEvaluation::offer(const RoundSummary& summary, const std::vector<TaskAgent>& agents,
+                            const MetaPolicy& meta) {
+  std::vector<Model> personal;
+  for (const TaskAgent& agent : agents) personal.push_back(agent.personal());
+  last_personal_ = {summary.round, summary.personal_return, std::move(personal)};
+  last_meta_ = {summary.round, summary.meta_return, {meta.model}};
+  // a missing return is not a number, and never better
+  if (last_personal_.value > best_personal_.value) best_personal_ = last_personal_;
+  if (last_meta_.value > best_meta_.value) best_meta_ = last_meta_;
+}
+
+std::vector<FreshReturn> FreshEvaluation::evaluate(const std::vector<TaskAgent>& agents,
+                                                   int episodes, bool cross) const {
+  std::vector<FreshReturn> rows;
+  const int n = static_cast<int>(agents.size());
+  const auto personal = [&](const char* snapshot, const Kept& kept) {
+    for (int trained = 0; trained < static_cast<int>(kept.models.size()); ++trained) {
+      for (int task = 0; task < n; ++task) {
+        if (task != trained && !cross) continue;
+        rows.push_back({snapshot, kept.round, Policy::kPersonal, trained, task,
+                        agents[task].evaluateFresh(kept.models[trained], episodes)});
+      }
+    }
+  };
+  const auto meta = [&](const char* snapshot, const Kept& kept) {
+    for (int task = 0; task < n && !kept.models.empty(); ++task) {
+      rows.push_back({snapshot, kept.round, Policy::kMeta, -1, task,
+                      agents[task].evaluateFresh(kept.models[0], episodes)});
+    }
+  };
+  personal("last", last_personal_);
+  personal("best", best_personal_);
+  // without a meta return there is no meta-policy to speak of
+  if (!best_meta_.models.empty()) {
+    meta("last", last_meta_);
+    meta("best", best_meta_);
+  }
+  return rows;
+}
+
+std::string FreshEvaluation::csv(const std::vector<FreshReturn>& rows) {
+  std::string text = "snapshot,round,policy,trained_task,task,return_mean,return_std,episodes\n";
+  for (const FreshReturn& row : rows) {
+    text += row.snapshot + "," + std::to_string(row.round) + "," + name(row.policy) + "," +
+            std::to_string(row.trained_task) + "," + std::to_string(row.task) + "," +
+            formatNumber(row.stats.mean) + "," + formatNumber(row.stats.std) + "," +
+            std::to_string(row.stats.episodes) + "\n";
+  }
+  return text;
+}
+
+}  // namespace pmeta

@@ -1,0 +1,274 @@
+#include "pmeta_core/nn/mlp.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "../support.h"
+#include "pmeta_core/nn/kernels.h"
+
+namespace pmeta {
+namespace {
+
+std::vector<float> noise(std::size_t n, std::uint64_t seed) {
+  Rng rng(seed, n, Stream::kMeasure);
+  std::vector<float> values(n);
+  for (float& value : values) value = static_cast<float>(rng.normal());
+  return values;
+}
+
+std::vector<float> initialised(const Mlp& mlp, std::uint64_t seed) {
+  std::vector<float> parameters(mlp.size());
+  Rng rng(seed, 0, Stream::kInitialise);
+  mlp.initialise(parameters.data(), rng);
+  return parameters;
+}
+
+// the values of the block `name` within the flat parameters
+const double* find(const Mlp& mlp, const std::vector<double>& parameters, const std::string& name) {
+  std::size_t offset = 0;
+  for (const Block& block : mlp.blocks()) {
+    if (block.name == mlp.spec().prefix + "." + name) return &parameters[offset];
+    offset += block.size();
+  }
+  ADD_FAILURE() << "no block " << name;
+  return nullptr;
+}
+
+std::vector<double> linear(const Mlp& mlp, const std::vector<double>& parameters,
+                           const std::string& name, const std::vector<double>& x, std::size_t out) {
+  const double* weight = find(mlp, parameters, name + ".weight");
+  const double* bias = find(mlp, parameters, name + ".bias");
+  std::vector<double> y(bias, bias + out);
+  for (std::size_t o = 0; o < out; ++o) {
+    for (std::size_t i = 0; i < x.size(); ++i) y[o] += weight[o * x.size() + i] * x[i];
+  }
+  return y;
+}
+
+// one sample in double, by the blocks' names
+std::vector<double> reference(const Mlp& mlp, const std::vector<double>& parameters,
+                              std::vector<double> x) {
+  const MlpSpec& spec = mlp.spec();
+  std::size_t l = 0;
+  for (; l < spec.hidden.size(); ++l) {
+    x = linear(mlp, parameters, "layer" + std::to_string(l), x, spec.hidden[l]);
+    for (double& unit : x) unit = std::max(unit, 0.0);
+  }
+  if (!spec.dueling) return linear(mlp, parameters, "layer" + std::to_string(l), x, spec.outputs);
+  const double value = linear(mlp, parameters, "value", x, 1)[0];
+  std::vector<double> q = linear(mlp, parameters, "advantage", x, spec.outputs);
+  double mean = 0;
+  for (const double a : q) mean += a / static_cast<double>(q.size());
+  for (double& a : q) a += value - mean;
+  return q;
+}
+
+// sum over batch and outputs of output * direction, so that `direction` is its gradient
+double project(const Mlp& mlp, const std::vector<double>& parameters,
+               const std::vector<double>& input, const std::vector<float>& direction) {
+  double sum = 0;
+  for (std::size_t b = 0; b * mlp.inputs() < input.size(); ++b) {
+    const auto begin = input.begin() + static_cast<std::ptrdiff_t>(b * mlp.inputs());
+    const auto y =
+        reference(mlp, parameters, {begin, begin + static_cast<std::ptrdiff_t>(mlp.inputs())});
+    for (std::size_t o = 0; o < y.size(); ++o) sum += y[o] * direction[b * y.size() + o];
+  }
+  return sum;
+}
+
+template <class Function>
+double centralDifference(std::vector<double>& x, std::size_t k, Function&& function) {
+  const double h = 1e-6, at = x[k];
+  x[k] = at + h;
+  const double above = function();
+  x[k] = at - h;
+  const double below = function();
+  x[k] = at;
+  return (above - below) / (2 * h);
+}
+
+struct Shape {
+  MlpSpec spec;
+  std::size_t batch;
+};
+
+class MlpOf : public ::testing::TestWithParam<Shape> {};
+INSTANTIATE_TEST_SUITE_P(
+    Shapes, MlpOf,
+    ::testing::Values(Shape{{"q", 4, {13, 10}, 2}, 9}, Shape{{"q", 5, {17, 12}, 3, true}, 6},
+                      Shape{{"q", 3, {}, 2}, 4}, Shape{{"q", 3, {}, 2, true}, 1},
+                      Shape{{"critic1", 7, {20}, 1}, 12}, Shape{{"pi", 6, {9, 8, 11}, 10}, 5},
+                      Shape{{"pi", 6, {9}, 4, true}, 1}),
+    [](const auto& test) { return "Number" + std::to_string(test.index); });
+
+TEST_P(MlpOf, ForwardAgreesWithDoubleOnEveryInstructionSet) {
+  const auto& [spec, batch] = GetParam();
+  const Mlp mlp(spec);
+  const auto parameters = initialised(mlp, 1), input = noise(batch * spec.inputs, 2);
+  const std::vector<double> exact(parameters.begin(), parameters.end());
+  MlpWorkspace workspace(mlp, batch);
+  for (const std::string& name : kernelNames()) {
+    setKernels(name);
+    const float* y = mlp.forward(parameters.data(), input.data(), batch, workspace);
+    for (std::size_t b = 0; b < batch; ++b) {
+      const auto* x = &input[b * spec.inputs];
+      const auto expected = reference(mlp, exact, {x, x + spec.inputs});
+      for (std::size_t o = 0; o < spec.outputs; ++o) {
+        EXPECT_NEAR(y[b * spec.outputs + o], expected[o], 3e-6) << name;
+      }
+    }
+  }
+  setKernels(kernelNames().front());
+}
+
+TEST_P(MlpOf, GradientsAgreeWithCentralDifferencesOfTheDoubleReference) {
+  const auto& [spec, batch] = GetParam();
+  const Mlp mlp(spec);
+  const auto parameters = initialised(mlp, 1), input = noise(batch * spec.inputs, 2);
+  const auto direction = noise(batch * spec.outputs, 3);
+  std::vector<double> p(parameters.begin(), parameters.end()), x(input.begin(), input.end());
+  const auto loss = [&, spec = spec] { return project(mlp, p, x, direction); };
+
+  MlpWorkspace workspace(mlp, batch);
+  for (const std::string& name : kernelNames()) {
+    setKernels(name);
+    std::vector<float> gradient(mlp.size(), -99), d_input(input.size(), -99);
+    mlp.forward(parameters.data(), input.data(), batch, workspace);
+    mlp.backward(parameters.data(), input.data(), batch, direction.data(), gradient.data(),
+                 d_input.data(), workspace);
+    for (std::size_t k = 0; k < p.size(); ++k) {
+      ASSERT_NEAR(gradient[k], centralDifference(p, k, loss), 1e-5) << name << " parameter " << k;
+    }
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      ASSERT_NEAR(d_input[k], centralDifference(x, k, loss), 1e-5) << name << " input " << k;
+    }
+  }
+  setKernels(kernelNames().front());
+}
+
+TEST_P(MlpOf, FrozenBackwardGivesTheSameInputGradient) {
+  const auto& [spec, batch] = GetParam();
+  const Mlp mlp(spec);
+  const auto parameters = initialised(mlp, 1), input = noise(batch * spec.inputs, 2);
+  const auto direction = noise(batch * spec.outputs, 3);
+  MlpWorkspace workspace(mlp, batch);
+  std::vector<float> gradient(mlp.size()), d_input(input.size()), d_part(batch * 2);
+  mlp.forward(parameters.data(), input.data(), batch, workspace);
+  mlp.backward(parameters.data(), input.data(), batch, direction.data(), gradient.data(),
+               d_input.data(), workspace);
+  mlp.backwardInput(parameters.data(), batch, direction.data(), 1, 2, d_part.data(), workspace);
+  for (std::size_t k = 0; k < d_part.size(); ++k) {
+    EXPECT_NEAR(d_part[k], d_input[k / 2 * spec.inputs + 1 + k % 2], 1e-6);
+  }
+}
+
+TEST(Mlp, LossOfOneUpdateHasTheRightGradient) {
+  // weighted squared TD error of the actions taken, through the dueling heads
+  const std::size_t batch = 8;
+  const Mlp mlp({"q", 4, {12, 9}, 3, true});
+  const auto parameters = initialised(mlp, 4), input = noise(batch * 4, 5);
+  const auto goal = noise(batch, 6), weight = noise(batch, 7);
+  std::vector<double> p(parameters.begin(), parameters.end());
+  const auto loss = [&] {
+    double sum = 0;
+    for (std::size_t b = 0; b < batch; ++b) {
+      const auto q = reference(mlp, p, {&input[4 * b], &input[4 * b] + 4});
+      sum += weight[b] * std::pow(q[b % 3] - goal[b], 2) / batch;
+    }
+    return sum;
+  };
+
+  MlpWorkspace workspace(mlp, batch);
+  const float* q = mlp.forward(parameters.data(), input.data(), batch, workspace);
+  std::vector<float> error(batch), d_error(batch), d_q(batch * 3), gradient(mlp.size());
+  for (std::size_t b = 0; b < batch; ++b) error[b] = q[3 * b + b % 3] - goal[b];
+  EXPECT_NEAR(kernels().squaredLoss(error.data(), weight.data(), d_error.data(), batch), loss(),
+              1e-5);
+  for (std::size_t b = 0; b < batch; ++b) d_q[3 * b + b % 3] = d_error[b];
+  mlp.backward(parameters.data(), input.data(), batch, d_q.data(), gradient.data(), nullptr,
+               workspace);
+  for (std::size_t k = 0; k < p.size(); ++k) {
+    ASSERT_NEAR(gradient[k], centralDifference(p, k, loss), 1e-5) << k;
+  }
+}
+
+TEST(Mlp, BatchesOfAnySizeAgree) {
+  // few rows take another way than many
+  const Mlp mlp({"q", 4, {64, 64}, 12});
+  const auto parameters = initialised(mlp, 1), input = noise(32 * 4, 2);
+  MlpWorkspace all(mlp, 32), one(mlp, 1);
+  const float* together = mlp.forward(parameters.data(), input.data(), 32, all);
+  for (std::size_t b = 0; b < 32; ++b) {
+    const float* alone = mlp.forward(parameters.data(), &input[4 * b], 1, one);
+    for (std::size_t o = 0; o < 12; ++o) EXPECT_NEAR(alone[o], together[12 * b + o], 2e-6);
+  }
+}
+
+TEST(Mlp, BlocksAreNamedAsInPyTorch) {
+  const Mlp plain({"q", 4, {8, 6}, 2}), dueling({"q", 4, {8}, 2, true});
+  EXPECT_EQ(ModelLayout(Precision::kFloat32, plain.blocks()).text(),
+            "float32\nq.layer0.weight 8 4\nq.layer0.bias 8\nq.layer1.weight 6 8\nq.layer1.bias 6\n"
+            "q.layer2.weight 2 6\nq.layer2.bias 2\n");
+  EXPECT_EQ(ModelLayout(Precision::kFloat32, dueling.blocks()).text(),
+            "float32\nq.layer0.weight 8 4\nq.layer0.bias 8\nq.value.weight 1 8\n"
+            "q.advantage.weight 2 8\nq.value.bias 1\nq.advantage.bias 2\n");
+  EXPECT_EQ(plain.size(), 8u * 4 + 8 + 6 * 8 + 6 + 2 * 6 + 2);
+  EXPECT_EQ(dueling.size(), 8u * 4 + 8 + 3 * 8 + 3);
+}
+
+TEST(Mlp, InitialisesUniformlyWithinTorchsBounds) {
+  const Mlp mlp({"q", 4, {400, 100}, 2});
+  const auto parameters = initialised(mlp, 3);
+  std::size_t offset = 0, inputs = 0;
+  for (const Block& block : mlp.blocks()) {
+    // a bias follows the weight of its layer, whose inputs bound both
+    if (block.shape.size() == 2) inputs = block.shape[1];
+    const double bound = 1 / std::sqrt(static_cast<double>(inputs));
+    double most = 0, sum = 0, squares = 0;
+    for (std::size_t k = 0; k < block.size(); ++k) {
+      const double x = parameters[offset + k];
+      most = std::max(most, std::abs(x));
+      sum += x;
+      squares += x * x;
+    }
+    const auto n = static_cast<double>(block.size());
+    EXPECT_LE(most, bound * (1 + 1e-6)) << block.name;
+    EXPECT_LT(std::abs(sum / n), 5 * bound / std::sqrt(3 * n)) << block.name;
+    if (n > 1000) {
+      EXPECT_NEAR(squares / n, bound * bound / 3, 0.05 * bound * bound) << block.name;
+    }
+    offset += block.size();
+  }
+  EXPECT_EQ(initialised(mlp, 3), parameters);
+  EXPECT_NE(initialised(mlp, 4), parameters);
+}
+
+TEST(Mlp, RefusesWhatItCannotDo) {
+  EXPECT_NE(test::errorOf([] {
+              Mlp({"q", 0, {4}, 2});
+            }).find("at least one input"),
+            std::string::npos);
+  EXPECT_NE(test::errorOf([] {
+              Mlp({"q", 4, {4, 0}, 2});
+            }).find("hidden layer"),
+            std::string::npos);
+  EXPECT_NE(test::errorOf([] { Mlp({"", 4, {4}, 2}); }).find("prefix"), std::string::npos);
+  const Mlp mlp({"q", 4, {4}, 2});
+  EXPECT_NE(test::errorOf([&] { MlpWorkspace(mlp, 0); }).find("at least one"), std::string::npos);
+  MlpWorkspace workspace(mlp, 3);
+  const std::vector<float> parameters(mlp.size()), input(16);
+  EXPECT_EQ(test::errorOf([&] { mlp.forward(parameters.data(), input.data(), 4, workspace); }),
+            "a batch of 4 does not fit the network's workspace of 3.");
+  std::vector<float> d(8);
+  EXPECT_EQ(test::errorOf([&] {
+              mlp.backwardInput(parameters.data(), 2, d.data(), 3, 2, d.data(), workspace);
+            }),
+            "the network 'q' has 4 inputs, none at 4.");
+}
+
+}  // namespace
+}  // namespace pmeta

@@ -1,0 +1,124 @@
+#include "pmeta_core/personal/evaluation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+namespace pmeta {
+namespace {
+
+// counts up from a random start by the action; ends above 10, or after 20 steps
+class Counter : public Env {
+ public:
+  Counter() {
+    spec_.name = "counter";
+    spec_.observation_size = 2;
+    spec_.action_size = 1;
+    spec_.horizon = 20;
+  }
+  const EnvSpec& spec() const override { return spec_; }
+  void reset(Rng& rng, double* observation) override {
+    value_ = static_cast<double>(rng.below(8));
+    steps_ = 0;
+    observe(observation);
+  }
+  Step step(const double* action, Rng&, double* observation) override {
+    value_ += action[0];
+    ++steps_;
+    observe(observation);
+    return {value_, value_ > 10, steps_ == spec_.horizon};
+  }
+
+ private:
+  void observe(double* observation) const {
+    observation[0] = value_;
+    observation[1] = -value_;
+  }
+  EnvSpec spec_;
+  double value_ = 0;
+  int steps_ = 0;
+};
+
+Evaluation makeEvaluation(int episodes) {
+  std::vector<std::unique_ptr<Env>> envs;
+  for (int i = 0; i < episodes; ++i) envs.push_back(std::make_unique<Counter>());
+  return Evaluation(std::move(envs));
+}
+
+// even numbers go up by one, odd ones by three
+double actionAt(float observation) { return std::fmod(observation, 2.0f) == 0 ? 1 : 3; }
+
+void act(const float* observations, int batch, double* actions) {
+  for (int b = 0; b < batch; ++b) {
+    EXPECT_EQ(observations[2 * b + 1], -observations[2 * b]) << "rows stay together";
+    actions[b] = actionAt(observations[2 * b]);
+  }
+}
+
+double returnFrom(double value) {
+  double sum = 0;
+  for (int t = 0; t < 20 && value <= 10; ++t) {
+    value += actionAt(static_cast<float>(value));
+    sum += value;
+  }
+  return sum;
+}
+
+TEST(Evaluation, IsTheMeanOverEpisodesRunOneByOne) {
+  for (const int episodes : {1, 2, 10, 37}) {
+    Evaluation evaluation = makeEvaluation(episodes);
+    Rng rng(1, 0, Stream::kEvaluate), same = rng;
+    std::vector<double> returns;
+    double mean = 0, squares = 0;
+    for (int i = 0; i < episodes; ++i) {
+      returns.push_back(returnFrom(static_cast<double>(same.below(8))));
+      mean += returns.back() / episodes;
+    }
+    for (const double value : returns) squares += (value - mean) * (value - mean) / episodes;
+    const ReturnStats stats = evaluation.run(act, rng);
+    EXPECT_EQ(stats.episodes, episodes);
+    EXPECT_NEAR(stats.mean, mean, 1e-12);
+    EXPECT_NEAR(stats.std, std::sqrt(squares), 1e-6);
+  }
+}
+
+TEST(Evaluation, StopsAtTheHorizon) {
+  Evaluation evaluation = makeEvaluation(3);
+  int calls = 0;
+  Rng rng(2, 0, Stream::kEvaluate);
+  evaluation.run(
+      [&](const float*, int batch, double* actions) {
+        ++calls;
+        for (int b = 0; b < batch; ++b) actions[b] = 0;
+      },
+      rng);
+  EXPECT_EQ(calls, 20);
+}
+
+TEST(Evaluation, RecordsTheFirstEpisode) {
+  Evaluation evaluation = makeEvaluation(5);
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    Rng rng(seed, 0, Stream::kEvaluate), same = rng;
+    const Episode e = evaluation.record(act, rng);
+    double value = static_cast<double>(same.below(8));
+    EXPECT_EQ(e.observation_size, 2);
+    EXPECT_EQ(e.action_size, 1);
+    ASSERT_EQ(e.observations.size(), 2 * (e.rewards.size() + 1));
+    ASSERT_EQ(e.actions.size(), e.rewards.size());
+    EXPECT_EQ(e.observations[0], value);
+    double sum = 0;
+    for (std::size_t t = 0; t < e.rewards.size(); ++t) {
+      EXPECT_EQ(e.actions[t], actionAt(static_cast<float>(value)));
+      value += e.actions[t];
+      EXPECT_EQ(e.observations[2 * t + 2], value);
+      sum += e.rewards[t];
+    }
+    EXPECT_TRUE(e.terminated);
+    EXPECT_FALSE(e.truncated);
+    EXPECT_EQ(sum, returnFrom(e.observations[0]));
+  }
+}
+
+}  // namespace
+}  // namespace pmeta
