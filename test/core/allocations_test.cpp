@@ -22,17 +22,15 @@ void* allocate(std::size_t n, std::size_t alignment) {
 
 }  // namespace
 
-// every other form of operator new ends in these two; weak, so that a file with a counter of its
-// own may be linked beside this one (and fails the test below)
-#define PMETA_WEAK __attribute__((weak))
-PMETA_WEAK void* operator new(std::size_t n) { return allocate(n, alignof(std::max_align_t)); }
-PMETA_WEAK void* operator new(std::size_t n, std::align_val_t alignment) {
+// every other form of operator new ends in these two
+void* operator new(std::size_t n) { return allocate(n, alignof(std::max_align_t)); }
+void* operator new(std::size_t n, std::align_val_t alignment) {
   return allocate(n, static_cast<std::size_t>(alignment));
 }
-PMETA_WEAK void operator delete(void* p) noexcept { std::free(p); }
-PMETA_WEAK void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-PMETA_WEAK void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
-PMETA_WEAK void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
 
 namespace pmeta::test {
 

@@ -44,6 +44,12 @@ class RunOverRos : public ::testing::Test {
     return summary_ && summary_->state == pmeta_msgs::RoundSummary::FINISHED;
   }
 
+  /// How the names of this run's tasks begin, e.g. "grid_".
+  std::string taskPrefix() const {
+    const std::string name = experiment_.family().taskName(0);
+    return name.substr(0, name.find('_') + 1);
+  }
+
   int roundsDone() const { return summary_ ? static_cast<int>(summary_->round) : 0; }
 
   /// The run's rounds.csv, final meta-policy and status are those of the local runner, bit for bit.
