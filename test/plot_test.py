@@ -1,9 +1,12 @@
 """Tests of `pmeta plot`: run folders written here, numbers worked out here from their CSV text."""
 
+import contextlib
 import csv
+import io
 import json
 import math
 import os
+import re
 import statistics
 import subprocess
 import sys
@@ -14,14 +17,21 @@ SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)),
                        "..", "src", "pmeta_nodes", "scripts")
 PLOT = os.path.join(SCRIPTS, "plot.py")
 sys.path.insert(0, SCRIPTS)
+import plot as program
+import pmeta_convergence as pc
+import pmeta_drawing as pd
 import pmeta_figures as pf
 import pmeta_runs as pr
+import pmeta_tables as pt
 
 HEADER = "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s"
+FRESH_HEADER = "snapshot,round,policy,trained_task,task,return_mean,return_std,episodes"
 CONFIG = """experiment: {experiment}
 algorithm: {algorithm}
 seed: {seed}
 rounds: {rounds}
+learner: {learner}
+fresh_episodes: {fresh}
 results_dir: /somewhere
 run_id: {run_id}
 personal:
@@ -39,7 +49,8 @@ environment:
 
 
 def write_run(top, algorithm="pmeta", seed=0, lambda_=10, rounds=4, status="finished",
-              experiment="grid", run_id=None, scale=1.0, optimal=None, started="2026-01-01"):
+              experiment="grid", run_id=None, scale=1.0, optimal=None, started="2026-01-01",
+              learner="q_learning", fresh=0):
     """A run of two tasks whose returns are uneven numbers, different for every setting and seed."""
     run_id = run_id or "%s_l%g_s%d" % (algorithm, lambda_, seed)
     folder = os.path.join(str(top), experiment, run_id)
@@ -48,8 +59,10 @@ def write_run(top, algorithm="pmeta", seed=0, lambda_=10, rounds=4, status="fini
     with open(os.path.join(folder, "config.yaml"), "w") as file:
         file.write(CONFIG.format(experiment=experiment, algorithm=algorithm, seed=seed,
                                  rounds=rounds, run_id=run_id, lambda_=lambda_,
+                                 learner=learner, fresh=fresh,
                                  beta=0 if algorithm == "independent" else 1))
-    tasks = [{"task": task, "split": "train"} for task in range(2)]
+    tasks = [{"task": task, "split": "train", "description": "zeta %g, force 1" % (3 + task / 2)}
+             for task in range(2)]
     for task, value in zip(tasks, optimal or ()):
         task["optimal_return"] = value
     with open(os.path.join(folder, "manifest.json"), "w") as file:
@@ -66,16 +79,41 @@ def write_run(top, algorithm="pmeta", seed=0, lambda_=10, rounds=4, status="fini
                              % (round_, task, policy, value, 100 * round_, 3 * round_))
     with open(os.path.join(folder, "rounds.csv"), "w") as file:
         file.write("\n".join(lines) + "\n")
+    if fresh:
+        write_fresh(folder, algorithm, seed + lambda_, fresh)
     return folder
 
 
+def write_fresh(folder, algorithm, shift, episodes):
+    """As the core does: last before best, personal before meta, all pairs of independent runs."""
+    lines = [FRESH_HEADER]
+    for number, (policy, snapshot) in enumerate(
+            (p, s) for p in ("personal", "meta") for s in ("last", "best")):
+        if (policy, algorithm) == ("meta", "independent"):
+            continue
+        for trained in range(2) if policy == "personal" else (-1,):
+            for task in range(2):
+                if policy == "personal" and trained != task and algorithm != "independent":
+                    continue
+                value = (-50 - 9 * (trained != task) - 3.1 * task - number
+                         - 0.7 * math.cos(shift))
+                lines.append("%s,3,%s,%d,%d,%r,2.5,%d" % (snapshot, policy, trained, task, value,
+                                                         episodes))
+    with open(os.path.join(folder, "final.csv"), "w") as file:
+        file.write("\n".join(lines) + "\n")
+
+
 def plot(*arguments, code=0):
-    """Runs the program as a shell does and returns (stdout, stderr)."""
-    done = subprocess.run([PLOT] + [str(a) for a in arguments], stdout=subprocess.PIPE,
-                          stderr=subprocess.PIPE, universal_newlines=True)
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
-    return done.stdout, done.stderr
+    """Runs the program in this process, which is quick, and returns (stdout, stderr)."""
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        result = program.main([str(a) for a in arguments])
+    texts = []
+    for stream in (out, err):
+        stream.flush()
+        texts.append(stream.buffer.getvalue().decode("utf-8"))
+    assert result == code, texts[1]
+    return texts
 
 
 def fails(*arguments):
@@ -90,6 +128,14 @@ def fails(*arguments):
 def summary(out):
     with open(os.path.join(str(out), "summary.csv"), encoding="utf-8") as file:
         return {row["group"]: row for row in csv.DictReader(file)}
+
+
+def fresh_mean(folder, snapshot, policy, own=True):
+    with open(os.path.join(folder, "final.csv")) as file:
+        return statistics.mean(
+            float(row["return_mean"]) for row in csv.DictReader(file)
+            if (row["snapshot"], row["policy"]) == (snapshot, policy)
+            and (policy == "meta" or not own or row["task"] == row["trained_task"]))
 
 
 def curve(folder, policy):
@@ -169,9 +215,9 @@ def test_writes_what_the_data_allow(tmp_path, sweep):
     out, err = plot(tmp_path)
     figures = tmp_path / "figures"
     names = sorted(os.listdir(str(figures)))
-    assert names == ["lambda_curves.pdf", "lambda_curves.png", "learning_curves.pdf",
-                     "learning_curves.png", "summary.csv", "summary.txt", "sweep_lambda.pdf",
-                     "sweep_lambda.png"]
+    assert names == ["best_returns.tex", "lambda_curves.pdf", "lambda_curves.png",
+                     "lambda_table.tex", "learning_curves.pdf", "learning_curves.png",
+                     "summary.csv", "summary.txt", "sweep_lambda.pdf", "sweep_lambda.png"]
     assert all("wrote " + str(figures / name) in out for name in names)
     assert (figures / "summary.txt").read_text(encoding="utf-8") in out
     assert (figures / "sweep_lambda.png").read_bytes().startswith(b"\x89PNG")
@@ -189,8 +235,8 @@ def test_same_runs_give_the_same_bytes(tmp_path):
 
 def test_what_and_format_limit_what_is_drawn(tmp_path, sweep):
     plot(tmp_path, "--what", "sweep", "--format", "pdf")
-    assert sorted(os.listdir(str(tmp_path / "figures"))) == ["summary.csv", "summary.txt",
-                                                             "sweep_lambda.pdf"]
+    assert sorted(os.listdir(str(tmp_path / "figures"))) == [
+        "best_returns.tex", "lambda_table.tex", "summary.csv", "summary.txt", "sweep_lambda.pdf"]
 
 
 def test_a_folder_for_every_experiment(tmp_path):
@@ -208,7 +254,7 @@ def test_a_run_given_twice_counts_once(tmp_path):
 
 
 def test_lines_and_bands_show_mean_and_deviation(tmp_path, sweep):
-    figure, axes = pf.panels(1, 1)
+    figure, axes = pd.panels(1, 1)
     group = groups_of(tmp_path)["grid"][1]
     pf.draw_curve(axes[0][0], group, "meta", "MP", **pf.MP)
     curves = list(zip(*(curve(folder, "meta") for folder in sweep["pmeta", 10])))
@@ -222,7 +268,7 @@ def test_lines_and_bands_show_mean_and_deviation(tmp_path, sweep):
 
 
 def test_sweep_points_show_mean_and_standard_error(tmp_path, sweep):
-    figure, axes = pf.panels(1, 1)
+    figure, axes = pd.panels(1, 1)
     groups = groups_of(tmp_path)["grid"]
     pf.draw_sweep(axes[0][0], "personal.lambda", groups[:3], "auc", groups)
     points, _, bars = axes[0][0].containers[0]
@@ -276,8 +322,11 @@ def test_optimum_only_if_every_task_has_it(tmp_path):
 def test_unfinished_runs_are_left_out_and_named(tmp_path):
     write_run(tmp_path, seed=0)
     folder = write_run(tmp_path, seed=1, status="stopped")
+    half = edit(write_run(tmp_path, seed=2, status="running"), "rounds.csv",
+                lambda t: t[:t.index("4,0,train")] + "4,0,tr")
     _, err = plot(tmp_path, "--format", "png")
-    assert folder in err and "'stopped'" in err
+    assert folder in err and "'stopped' (4 of 4 rounds)" in err
+    assert os.path.dirname(half) in err and "'running' (3 of 4 rounds)" in err
     assert summary(tmp_path / "figures")["pMeta-RL λ=10"]["seeds"] == "1"
 
 
@@ -410,8 +459,179 @@ def test_a_reader_that_stops_early_is_no_error(tmp_path):
 
 
 def test_help():
-    out, _ = plot("--help")
+    out = subprocess.run([PLOT, "--help"], stdout=subprocess.PIPE, check=True,
+                         universal_newlines=True).stdout
     assert "--what" in out and "figures" in out
+
+
+def test_refusal_ends_with_status_1(tmp_path):
+    done = subprocess.run([PLOT, str(tmp_path)], stderr=subprocess.PIPE, universal_newlines=True)
+    assert done.returncode == 1
+    assert done.stderr.startswith("plot: there are no runs in") and done.stderr.count("\n") == 1
+
+
+@pytest.fixture
+def deep(tmp_path):
+    """{(algorithm, lambda): [folder of seed 0, 1, 2]} of an experiment that the paper has, too."""
+    folders = {}
+    for algorithm, value in (("pmeta", 5), ("pmeta", 20), ("model_averaging", 0),
+                             ("independent", 0)):
+        folders[algorithm, value] = [
+            write_run(tmp_path, algorithm, s, lambda_=value, experiment="mountain_car",
+                      learner="dqn", fresh=100) for s in range(3)]
+    return folders
+
+
+@pytest.fixture
+def drawn(tmp_path, deep):
+    """(stdout, stderr) of the deep experiment, drawn once into tmp_path/out."""
+    return plot(tmp_path, "--out", tmp_path / "out", "--format", "png", "--what", "tasks")
+
+
+def test_best_and_fresh_returns_are_what_the_files_say(tmp_path, deep, drawn):
+    rows = summary(tmp_path / "out")
+    labels = {("pmeta", 5): "pMeta-RL λ=5", ("pmeta", 20): "pMeta-RL λ=20",
+              ("model_averaging", 0): "model averaging", ("independent", 0): "independent"}
+    for key, folders in deep.items():
+        row = rows[labels[key]]
+        assert row["fresh_seeds"] == row["seeds"] == "3"
+        for policy, name in (("personal", "pp"), ("meta", "mp")):
+            if (policy, key[0]) == ("meta", "independent"):
+                assert row["mp_best_mean"] == row["mp_fresh_best_mean"] == ""
+                continue
+            measured = {"best": [max(curve(f, policy)) for f in folders],
+                        "fresh_best": [fresh_mean(f, "best", policy) for f in folders],
+                        "fresh_last": [fresh_mean(f, "last", policy) for f in folders]}
+            for measure, values in measured.items():
+                column = "%s_%s_" % (name, measure)
+                assert float(row[column + "mean"]) == pytest.approx(statistics.mean(values))
+                assert float(row[column + "std"]) == pytest.approx(statistics.stdev(values))
+    for snapshot in ("best", "last"):
+        values = [fresh_mean(f, snapshot, "personal", own=False) for f in deep["independent", 0]]
+        column = "all_fresh_%s_" % snapshot
+        row = rows["independent"]
+        assert float(row[column + "mean"]) == pytest.approx(statistics.mean(values))
+        assert float(row[column + "std"]) == pytest.approx(statistics.stdev(values))
+        assert float(row[column + "mean"]) != float(row["pp_fresh_%s_mean" % snapshot])
+        assert rows["pMeta-RL λ=20"][column + "mean"] == ""
+
+
+def table_row(text, *words):
+    """The one line that holds all the words."""
+    lines = [line for line in text.split("\n") if all(word in line for word in words)]
+    assert len(lines) == 1, lines
+    return lines[0]
+
+
+def test_the_paper_stands_beside_what_corresponds(tmp_path, drawn):
+    out = drawn[0].split("best returns", 1)[1].split("Returns are")[0]
+    ends = [re.split(" {2,}", line.strip())[-2:] for line in out.strip().split("\n")]
+    assert ends == [["paper, λ", "paper, best"],
+                    ["-93.05 ± 1.07", "-"], ["-111.15 ± 4.31", "-"],
+                    ["-92.13 ± 0.95", "-93.05 ± 0.95"], ["-107.08 ± 3.21", "-107.15 ± 4.10"],
+                    ["-", "-"], ["-", "-111.34 ± 5.95"],
+                    ["-", "-92.96 ± 2.08"], ["-", "-133.96 ± 3.25"]]
+    assert re.search(r"independent +PP \(DQN\*\) ", out) and " all (DQN) " in out
+
+
+def test_no_paper_and_no_fresh_columns_without_them(tmp_path):
+    write_run(tmp_path)
+    out, _ = plot(tmp_path, "--format", "png", "--out", tmp_path / "out")
+    assert "paper" not in out.split("Returns are")[0] and "fresh" not in out.split("Returns")[0]
+    assert "fresh" not in (tmp_path / "out/best_returns.tex").read_text().split("begin{tab")[2]
+    assert not (tmp_path / "out/lambda_table.tex").exists()
+    assert not (tmp_path / "out/tasks_last.csv").exists()
+    assert "nothing to draw for tasks" in fails(tmp_path, "--what", "tasks")
+
+
+def test_text_tables_fit_a_terminal(tmp_path, drawn):
+    assert max(map(len, (tmp_path / "out/summary.txt").read_text("utf-8").split("\n"))) <= 120
+    wide = [("group", "a", "b"), ("g" * 60, "1" * 40, "2" * 30), ("", "3", "4")]
+    lines = pt.aligned(wide[0], wide[1:])
+    assert max(map(len, lines)) <= 120 and lines[2] == "  " + "g" * 60
+    assert lines[3].split() == ["1" * 40, "2" * 30] and lines[4].split() == ["3", "4"]
+
+
+def test_latex_tables_follow_from_the_csv(tmp_path, drawn):
+    rows = summary(tmp_path / "out")
+    best = (tmp_path / "out/best_returns.tex").read_text(encoding="utf-8")
+    lambdas = (tmp_path / "out/lambda_table.tex").read_text(encoding="utf-8")
+    assert "mountain\\_car" in best and "λ" not in best + lambdas
+
+    def cell(label, column):
+        return "$%.2f \\pm %.2f$" % tuple(float(rows[label][column + s]) for s in ("mean", "std"))
+
+    assert table_row(best, "$\\lambda$=20, MP") == "    pMeta-RL $\\lambda$=20, MP & %s & %s \\\\" % (
+        cell("pMeta-RL λ=20", "mp_best_"), cell("pMeta-RL λ=20", "mp_fresh_best_"))
+    assert table_row(best, "DQN*").count("$") == 4 and "all (DQN) & -- & $" in best
+    assert "$\\lambda=5$ & $\\lambda=20$" in lambdas
+    five, twenty = (cell("pMeta-RL λ=%d" % v, "pp_best_") for v in (5, 20))
+    means = [float(rows["pMeta-RL λ=%d" % v]["pp_best_mean"]) for v in (5, 20)]
+    assert means[0] > means[1]
+    assert table_row(lambdas, "PP &") == "    PP & {\\boldmath %s} & %s \\\\" % (five, twenty)
+    for text in (best, lambdas):
+        assert text.count("{") == text.count("}") and text.count("$") % 2 == 0
+
+
+def test_latex_escapes_labels():
+    assert pt.latex("η=1 a_b 5% λ") == r"$\eta$=1 a\_b 5\% $\lambda$"
+
+
+def test_returns_task_by_task(tmp_path, deep, drawn):
+    assert {"tasks_last.csv", "tasks_last.png"} <= set(os.listdir(str(tmp_path / "out")))
+    with open(str(tmp_path / "out/tasks_last.csv"), encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    row = [r for r in rows if (r["group"], r["snapshot"], r["policies"], r["task"])
+           == ("independent", "best", "all", "1")][0]
+    assert (row["name"], row["episodes"], row["seeds"]) == ("zeta 3.5", "fresh", "3")
+    values = []
+    for folder in deep["independent", 0]:
+        with open(os.path.join(folder, "final.csv")) as file:
+            values.append(statistics.mean(
+                float(r["return_mean"]) for r in csv.DictReader(file)
+                if (r["snapshot"], r["task"]) == ("best", "1")))
+    assert float(row["mean"]) == pytest.approx(statistics.mean(values))
+    assert float(row["min"]) == pytest.approx(min(values))
+
+
+def test_tasks_without_fresh_episodes_are_those_of_the_round(tmp_path):
+    folder = write_run(tmp_path, learner="dqn")
+    group = groups_of(tmp_path)["grid"][0]
+    curves = curve(folder, "meta")
+    for snapshot, place in (("best", curves.index(max(curves))), ("last", -1)):
+        values, measured = group.by_task("meta", snapshot)
+        assert measured == "evaluation"
+        assert values.mean() == pytest.approx(curves[place])
+    figure, axes = pd.panels(1, 1)
+    assert pf.draw_tasks(axes[0][0], group, "last") == "evaluation"
+    points = axes[0][0].lines[1]
+    assert list(points.get_xdata()) == list(values[0])
+
+
+def test_seeds_without_fresh_episodes_are_named(tmp_path):
+    first = write_run(tmp_path, fresh=100)
+    write_run(tmp_path, seed=1)
+    _, err = plot(tmp_path, "--what", "curves", "--format", "png")
+    assert "1 of the 2 runs" in err and "no final.csv" in err
+    row = summary(tmp_path / "figures")["pMeta-RL λ=10"]
+    assert row["fresh_seeds"] == "1" and not row["mp_fresh_best_std"]
+    assert float(row["mp_fresh_best_mean"]) == pytest.approx(fresh_mean(first, "best", "meta"))
+
+
+@pytest.mark.parametrize("change, words", [
+    (lambda t: t[:-1], "line 9 is truncated"),
+    (lambda t: t.replace("snapshot", "shot"), "line 1: the header"),
+    (lambda t: t.replace("last", "first", 1), "line 2: snapshot and policy are 'first'"),
+    (lambda t: t.replace("personal,1,1", "personal,1,2", 1), "line 3: task 2"),
+    (lambda t: t.replace("personal,1,1", "personal,0,0", 1), "line 3 repeats"),
+    (lambda t: t.replace("last,3,meta,-1,1", "best,3,meta,-1,7", 1), "out of range"),
+    (lambda t: t[:t.rindex("best")], "has the meta returns (best) of 1 of 2 tasks"),
+    (lambda t: t.replace(",2.5,", ",", 1), "7 fields instead of 8"),
+])
+def test_malformed_fresh_returns_are_refused(tmp_path, change, words):
+    path = edit(write_run(tmp_path, fresh=100), "final.csv", change)
+    message = fails(tmp_path)
+    assert path in message and words in message
 
 
 @pytest.fixture
@@ -450,12 +670,12 @@ def test_convergence_figures(tmp_path, convergence):
 
 
 def test_convergence_slopes_are_measured(tmp_path, convergence):
-    class Kept(pf.Figures):
+    class Kept(pd.Figures):
         def save(self, figure, name):
             self.written.append(figure)
 
     kept = Kept("", ())
-    pf.draw_convergence(pr.load_convergence([str(convergence)]), kept)
+    pc.draw_convergence(pr.load_convergence([str(convergence)]), kept)
     contraction, _, gradient, distance = kept.written
     line = contraction.axes[0].lines[0]
     assert list(line.get_ydata() * line.get_xdata()) == pytest.approx([0.9] * 50)

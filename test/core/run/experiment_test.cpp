@@ -256,6 +256,76 @@ TEST(ResultsDir, WithoutAHomeItMustBeGiven) {
   EXPECT_EQ(expandResultsDir("/tmp/x"), "/tmp/x");
 }
 
+constexpr char kWithPresets[] =
+    "rounds: 7\n"
+    "personal: {lambda: 3}\n"
+    "presets:\n"
+    "  paper: {personal: {lambda: 2}, rounds: 5}\n"
+    "  deep: {learner: dqn, environment: {name: cart_pole}, dqn: {hidden: [8]}}\n";
+
+TEST(Presets, AreReadOverTheRestAndUnderOverrides) {
+  const auto load = [](const std::vector<std::string>& overrides) {
+    return Experiment::parse(kWithPresets, "file.yaml", overrides).settings();
+  };
+  EXPECT_EQ(load({}).rounds, 7);
+  EXPECT_EQ(load({}).personal.lambda, 3);
+  EXPECT_EQ(load({"preset:=paper"}).rounds, 5);
+  EXPECT_EQ(load({"preset:=paper"}).personal.lambda, 2);
+  EXPECT_EQ(load({"preset:=paper", "lambda:=4"}).personal.lambda, 4);
+  EXPECT_EQ(load({"preset:=deep"}).learner, "dqn");
+  EXPECT_EQ(load({"preset:=deep"}).environment, "cart_pole");
+}
+
+TEST(Presets, EffectiveSettingsAreReadAgainWithoutTheFile) {
+  const auto first = Experiment::parse(kWithPresets, "file.yaml", {"preset:=deep", "run_id:=r"});
+  const auto second = Experiment::parse(first.yaml(), "config.yaml");
+  EXPECT_EQ(second.yaml(), first.yaml());
+  EXPECT_EQ(second.settings().preset, "deep");
+}
+
+TEST(Presets, UnknownOnesAreRefusedWithTheKnown) {
+  EXPECT_EQ(errorOf([] { Experiment::parse(kWithPresets, "file.yaml", {"preset:=papre"}); }),
+            "unknown preset 'papre': file.yaml has paper, deep.");
+  EXPECT_EQ(errorOf([] { Experiment::parse("rounds: 1", "file.yaml", {"preset:=paper"}); }),
+            "unknown preset 'paper': file.yaml has none.");
+}
+
+TEST(Presets, ErrorsInThemKeepTheirLine) {
+  const std::string text = "rounds: 7\npresets:\n  bad:\n    personal:\n      lamda: 2\n";
+  EXPECT_EQ(errorOf([&] { Experiment::parse(text, "file.yaml", {"preset:=bad"}); }),
+            "unknown setting 'personal.lamda' (file.yaml line 5): did you mean 'personal.lambda'?");
+}
+
+TEST(Learner, MustFitTheEnvironment) {
+  const auto tabular = Experiment::parse("environment: {name: cart_pole}", "test");
+  EXPECT_EQ(errorOf([&] { tabular.makeLearner(0); }),
+            "environment 'cart_pole' is not tabular, so q_learning cannot learn it: choose "
+            "learner:=dqn.");
+}
+
+TEST(Learner, SettingsOfOthersAreUnknown) {
+  EXPECT_NE(errorOf([] { Experiment::parse("dqn: {n_step: 1}", "test"); }).find("unknown setting"),
+            std::string::npos);
+  EXPECT_NE(errorOf([] {
+              Experiment::parse("learner: dqn\nq_learning: {gamma: 0}", "test");
+            }).find("unknown setting"),
+            std::string::npos);
+}
+
+TEST(Stability, OfNetworksOnlyThePullCounts) {
+  const auto load = [](const std::vector<std::string>& overrides) {
+    return Experiment::parse(
+        "learner: dqn\nenvironment: {name: cart_pole}\n"
+        "personal: {alpha: 0.001, lambda: 20, eta: 0.01}",
+        "test", overrides);
+  };
+  EXPECT_TRUE(load({}).notes().empty());
+  EXPECT_EQ(errorOf([&] { load({"alpha:=0.1"}); }),
+            "personal.alpha = 0.1 with personal.lambda = 20 diverges: alpha must be below "
+            "2 / lambda = 0.1.");
+  EXPECT_EQ(load({"alpha:=0.06"}).notes().size(), 1u);
+}
+
 TEST(RequireWritable, CreatesTheFolderAndLeavesNothingInIt) {
   const TempDir dir;
   requireWritable(dir / "a/b");

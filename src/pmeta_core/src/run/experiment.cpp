@@ -57,14 +57,14 @@ std::string peek(const std::vector<YAML::Node>& files, const std::vector<std::st
 }
 
 // the file without its presets, then the chosen preset
-std::vector<YAML::Node> choosePreset(const YAML::Node& root, const std::string& source,
+std::vector<YAML::Node> choosePreset(YAML::Node base, const std::string& source,
                                      const std::vector<std::string>& overrides) {
-  YAML::Node base = YAML::Clone(root);
+  const std::string chosen = peek({base}, overrides, "", "preset", "");
+  const YAML::Node presets = base["presets"];
+  // taken out in place: a clone would forget its line numbers
   base.remove("presets");
-  const std::string chosen = peek({root}, overrides, "", "preset", "");
-  const YAML::Node presets = root["presets"];
   // effective settings name the preset they came from, which is part of them already
-  if (chosen.empty() || (!presets && peek({root}, {}, "", "preset", "") == chosen)) return {base};
+  if (chosen.empty() || (!presets && peek({base}, {}, "", "preset", "") == chosen)) return {base};
   std::vector<std::string> known;
   if (presets && presets.IsMap()) {
     for (const auto& preset : presets) known.push_back(preset.first.Scalar());

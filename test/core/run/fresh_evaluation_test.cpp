@@ -1,0 +1,94 @@
+#include "pmeta_core/run/fresh_evaluation.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "../support.h"
+#include "pmeta_core/run/local_runner.h"
+
+namespace pmeta {
+namespace {
+
+Experiment deep(const std::vector<std::string>& overrides) {
+  return Experiment::parse(
+      "learner: dqn\nenvironment: {name: cart_pole, force_mag: [10, 5], masspole: 0.1, length: "
+      "0.5}\nrounds: 4\nupdates_per_round: 30\npersonal: {alpha: 0.001, lambda: 20, eta: 0.01}\n"
+      "dqn: {hidden: [16], num_envs: 2}\nrun_id: r\nfresh_episodes: 25\n",
+      "test", overrides);
+}
+
+TEST(FreshEvaluation, GivesEveryKeptPolicyOnItsTasks) {
+  const LocalResult result = runLocally(deep({}));
+  std::map<std::pair<std::string, Policy>, int> rows;
+  for (const FreshReturn& row : result.fresh) {
+    ++rows[{row.snapshot, row.policy}];
+    EXPECT_GE(row.stats.episodes, 25);
+    EXPECT_GE(row.stats.mean, 1);
+    EXPECT_LE(row.stats.mean, 200);
+    if (row.policy == Policy::kPersonal) {
+      EXPECT_EQ(row.trained_task, row.task);
+    }
+    if (row.policy == Policy::kMeta) {
+      EXPECT_EQ(row.trained_task, -1);
+    }
+    if (row.snapshot == "last") {
+      EXPECT_EQ(row.round, 4);
+    }
+  }
+  EXPECT_EQ(rows.size(), 4u);
+  for (const auto& entry : rows) EXPECT_EQ(entry.second, 2);
+}
+
+TEST(FreshEvaluation, TheBestRoundIsTheOneOfTheHighestMean) {
+  const LocalResult result = runLocally(deep({}));
+  int best = 0;
+  double value = -1;
+  for (const auto& round : result.rounds) {
+    if (round.summary.personal_return > value) {
+      value = round.summary.personal_return;
+      best = round.summary.round;
+    }
+  }
+  for (const FreshReturn& row : result.fresh) {
+    if (row.snapshot == "best" && row.policy == Policy::kPersonal) {
+      EXPECT_EQ(row.round, best);
+    }
+  }
+}
+
+TEST(FreshEvaluation, IndependentPoliciesAreCrossedAndHaveNoMeta) {
+  const LocalResult result = runLocally(deep({"algorithm:=independent"}));
+  EXPECT_EQ(result.fresh.size(), 2u * 2 * 2);
+  for (const FreshReturn& row : result.fresh) EXPECT_EQ(row.policy, Policy::kPersonal);
+}
+
+TEST(FreshEvaluation, ChangesNothingOfTheRun) {
+  const LocalResult with = runLocally(deep({}));
+  const LocalResult without = runLocally(deep({"fresh_episodes:=0"}));
+  EXPECT_TRUE(with.meta == without.meta);
+  EXPECT_TRUE(without.fresh.empty());
+}
+
+TEST(FreshEvaluation, FreshEpisodesAreNotThoseOfTheRounds) {
+  const Experiment experiment = deep({});
+  TaskAgent agent(experiment, 0);
+  const MetaAggregator aggregator(experiment);
+  const Model& policy = aggregator.metaPolicy().model;
+  // ten starts against a hundred others: equal means would be a coincidence
+  EXPECT_NE(agent.evaluateFresh(policy, 100).mean,
+            agent.evaluateMeta(aggregator.metaPolicy()).mean);
+  EXPECT_EQ(agent.evaluateFresh(policy, 100).episodes, 100);
+  EXPECT_EQ(agent.evaluateFresh(policy, 100).mean, agent.evaluateFresh(policy, 100).mean);
+}
+
+TEST(FreshEvaluation, WritesOneLineForEachRow) {
+  EXPECT_EQ(FreshEvaluation::csv({{"best", 3, Policy::kPersonal, 1, 0, {-1.5, 0.25, 100}},
+                                  {"last", 4, Policy::kMeta, -1, 2, {200, 0, 100}}}),
+            "snapshot,round,policy,trained_task,task,return_mean,return_std,episodes\n"
+            "best,3,personal,1,0,-1.5,0.25,100\n"
+            "last,4,meta,-1,2,200,0,100\n");
+}
+
+}  // namespace
+}  // namespace pmeta
