@@ -470,26 +470,31 @@ def test_refusal_ends_with_status_1(tmp_path):
     assert done.stderr.startswith("plot: there are no runs in") and done.stderr.count("\n") == 1
 
 
-@pytest.fixture
-def deep(tmp_path):
+@pytest.fixture(scope="module")
+def deep_top(tmp_path_factory):
+    return tmp_path_factory.mktemp("deep")
+
+
+@pytest.fixture(scope="module")
+def deep(deep_top):
     """{(algorithm, lambda): [folder of seed 0, 1, 2]} of an experiment that the paper has, too."""
     folders = {}
     for algorithm, value in (("pmeta", 5), ("pmeta", 20), ("model_averaging", 0),
                              ("independent", 0)):
         folders[algorithm, value] = [
-            write_run(tmp_path, algorithm, s, lambda_=value, experiment="mountain_car",
+            write_run(deep_top, algorithm, s, lambda_=value, experiment="mountain_car",
                       learner="dqn", fresh=100) for s in range(3)]
     return folders
 
 
-@pytest.fixture
-def drawn(tmp_path, deep):
-    """(stdout, stderr) of the deep experiment, drawn once into tmp_path/out."""
-    return plot(tmp_path, "--out", tmp_path / "out", "--format", "png", "--what", "tasks")
+@pytest.fixture(scope="module")
+def drawn(deep_top, deep):
+    """(stdout, stderr) of the deep experiment, drawn once into deep_top/out."""
+    return plot(deep_top, "--out", deep_top / "out", "--format", "png", "--what", "tasks")
 
 
-def test_best_and_fresh_returns_are_what_the_files_say(tmp_path, deep, drawn):
-    rows = summary(tmp_path / "out")
+def test_best_and_fresh_returns_are_what_the_files_say(deep_top, deep, drawn):
+    rows = summary(deep_top / "out")
     labels = {("pmeta", 5): "pMeta-RL λ=5", ("pmeta", 20): "pMeta-RL λ=20",
               ("model_averaging", 0): "model averaging", ("independent", 0): "independent"}
     for key, folders in deep.items():
@@ -523,7 +528,7 @@ def table_row(text, *words):
     return lines[0]
 
 
-def test_the_paper_stands_beside_what_corresponds(tmp_path, drawn):
+def test_the_paper_stands_beside_what_corresponds(drawn):
     out = drawn[0].split("best returns", 1)[1].split("Returns are")[0]
     ends = [re.split(" {2,}", line.strip())[-2:] for line in out.strip().split("\n")]
     assert ends == [["paper, λ", "paper, best"],
@@ -544,25 +549,26 @@ def test_no_paper_and_no_fresh_columns_without_them(tmp_path):
     assert "nothing to draw for tasks" in fails(tmp_path, "--what", "tasks")
 
 
-def test_text_tables_fit_a_terminal(tmp_path, drawn):
-    assert max(map(len, (tmp_path / "out/summary.txt").read_text("utf-8").split("\n"))) <= 120
+def test_text_tables_fit_a_terminal(deep_top, drawn):
+    assert max(map(len, (deep_top / "out/summary.txt").read_text("utf-8").split("\n"))) <= 120
     wide = [("group", "a", "b"), ("g" * 60, "1" * 40, "2" * 30), ("", "3", "4")]
     lines = pt.aligned(wide[0], wide[1:])
     assert max(map(len, lines)) <= 120 and lines[2] == "  " + "g" * 60
     assert lines[3].split() == ["1" * 40, "2" * 30] and lines[4].split() == ["3", "4"]
 
 
-def test_latex_tables_follow_from_the_csv(tmp_path, drawn):
-    rows = summary(tmp_path / "out")
-    best = (tmp_path / "out/best_returns.tex").read_text(encoding="utf-8")
-    lambdas = (tmp_path / "out/lambda_table.tex").read_text(encoding="utf-8")
+def test_latex_tables_follow_from_the_csv(deep_top, drawn):
+    rows = summary(deep_top / "out")
+    best = (deep_top / "out/best_returns.tex").read_text(encoding="utf-8")
+    lambdas = (deep_top / "out/lambda_table.tex").read_text(encoding="utf-8")
     assert "mountain\\_car" in best and "λ" not in best + lambdas
 
     def cell(label, column):
         return "$%.2f \\pm %.2f$" % tuple(float(rows[label][column + s]) for s in ("mean", "std"))
 
-    assert table_row(best, "$\\lambda$=20, MP") == "    pMeta-RL $\\lambda$=20, MP & %s & %s \\\\" % (
+    assert table_row(best, "=20, MP").split(" & ", 1)[1] == "%s & %s \\\\" % (
         cell("pMeta-RL λ=20", "mp_best_"), cell("pMeta-RL λ=20", "mp_fresh_best_"))
+    assert "\n    pMeta-RL $\\lambda$=20, MP & " in best
     assert table_row(best, "DQN*").count("$") == 4 and "all (DQN) & -- & $" in best
     assert "$\\lambda=5$ & $\\lambda=20$" in lambdas
     five, twenty = (cell("pMeta-RL λ=%d" % v, "pp_best_") for v in (5, 20))
@@ -577,9 +583,9 @@ def test_latex_escapes_labels():
     assert pt.latex("η=1 a_b 5% λ") == r"$\eta$=1 a\_b 5\% $\lambda$"
 
 
-def test_returns_task_by_task(tmp_path, deep, drawn):
-    assert {"tasks_last.csv", "tasks_last.png"} <= set(os.listdir(str(tmp_path / "out")))
-    with open(str(tmp_path / "out/tasks_last.csv"), encoding="utf-8") as file:
+def test_returns_task_by_task(deep_top, deep, drawn):
+    assert {"tasks_last.csv", "tasks_last.png"} <= set(os.listdir(str(deep_top / "out")))
+    with open(str(deep_top / "out/tasks_last.csv"), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     row = [r for r in rows if (r["group"], r["snapshot"], r["policies"], r["task"])
            == ("independent", "best", "all", "1")][0]

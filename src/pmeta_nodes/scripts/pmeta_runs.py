@@ -1,27 +1,26 @@
 """Run folders as pMeta writes them: found, read, checked, and grouped by settings.
 
-A run folder holds config.yaml, manifest.json and rounds.csv. A group is all runs of one experiment
-whose settings are equal but for the seed; a group's curves are seeds x rounds, each entry the mean
-return over the training tasks.
+A run folder holds config.yaml, manifest.json and rounds.csv, and final.csv if the kept policies
+were tried on fresh episodes. A group is all runs of one experiment whose settings are equal but for
+the seed; a group's curves are seeds x rounds, each entry the mean return over the training tasks.
 """
 
 import json
 import math
 import os
 import re
-import sys
 
 import numpy as np
-import yaml
 
-HEADER = "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s"
+from pmeta_files import (PlotError, read_columns, read_fresh, read_rounds, read_text, read_yaml,
+                         warn)
+
 CONVERGENCE_MARKS = ("statements.csv", "gradient.csv", "contraction.csv")
 CONVERGENCE_FILES = ("contraction.csv", "fixed_point.csv", "gradient.csv", "distance.csv")
 
-WORD_COLUMNS = ("diversity", "step", "update")
-
 # settings that name a run or pace it, and do not shape its result
-NAMES = {"experiment", "algorithm", "seed", "run_id", "results_dir", "pace", "publish_trajectories"}
+NAMES = {"experiment", "algorithm", "seed", "run_id", "results_dir", "pace", "publish_trajectories",
+         "fresh_episodes"}
 # settings an algorithm fixes or does not use: they tell no two groups of it apart
 PROXIMAL = {"personal.lambda", "personal.eta", "personal.personal_init", "personal.proximal"}
 UNUSED = {
@@ -35,14 +34,6 @@ ALGORITHMS = {"pmeta": "pMeta-RL", "model_averaging": "model averaging",
 SYMBOLS = {"personal.lambda": "λ", "personal.alpha": "α", "personal.eta": "η",
            "aggregation.beta": "β", "q_learning.gamma": "γ", "q_learning.updates": "K",
            "updates_per_round": "R", "rounds": "C"}
-
-
-class PlotError(Exception):
-    """What is wrong with the input, in one sentence."""
-
-
-def warn(text):
-    print("plot: warning: " + text, file=sys.stderr)
 
 
 def find_folders(dirs):
@@ -90,6 +81,19 @@ class Run:
                        for policy, by_round in returns.items()}
         if not self.curves:
             raise PlotError("%s holds no returns although the run has finished." % path)
+        self.returns = returns
+        self.num_tasks = 1 + max(task for by_round in returns.values()
+                                 for by_task in by_round.values() for task in by_task)
+        self.task_names = _task_names(manifest, self.num_tasks)
+        path = os.path.join(folder, "final.csv")
+        self.fresh = read_fresh(path, self.num_tasks) if os.path.isfile(path) else {}
+
+    def by_task(self, policy, snapshot):
+        """Return of each task on the evaluation episodes of a round; NaN if it did not report."""
+        curve = self.curves[policy]
+        place = int(np.argmax(curve)) if snapshot == "best" else len(curve) - 1
+        by_task = self.returns[policy][self.rounds[place]]
+        return np.array([by_task.get(task, math.nan) for task in range(self.num_tasks)])
 
     def _curve(self, path, policy, by_round):
         last = max(by_round)
@@ -142,118 +146,27 @@ def _finished_manifest(folder):
         raise PlotError("%s must hold a JSON object." % path)
     if manifest.get("status") == "finished":
         return manifest
+    done = manifest.get("rounds_done", "?")
+    path = os.path.join(folder, "rounds.csv")
+    if manifest.get("status") == "running" and os.path.isfile(path):
+        # the manifest is written at the start and at the end alone
+        lines = read_text(path).split("\n")[:-1]
+        done = lines[-1].split(",")[0] if len(lines) > 1 else 0
     warn("%s is left out: its status is '%s' (%s of %s rounds), not 'finished'."
-         % (folder, manifest.get("status"), manifest.get("rounds_done", "?"),
-            manifest.get("rounds", "?")))
+         % (folder, manifest.get("status"), done, manifest.get("rounds", "?")))
     return None
 
 
-def read_columns(path):
-    """{column: values} of a convergence file: words, or floats where NaN is fair."""
-    header = tuple(read_text(path).split("\n", 1)[0].split(","))
-    columns = {name: [] for name in header}
-    for number, fields in read_csv(path):
-        for name, text in zip(header, fields):
-            if name not in WORD_COLUMNS:
-                try:
-                    text = float(text)
-                except ValueError:
-                    raise PlotError("%s line %d: %s is '%s', not a number."
-                                    % (path, number, name, text))
-            columns[name].append(text)
-    return {name: np.array(values) for name, values in columns.items()}
-
-
-def require_columns(path, columns, names):
-    for name in names:
-        if name not in columns:
-            raise PlotError("%s line 1: the column '%s' is missing." % (path, name))
-
-
-def read_rounds(path):
-    """{policy: {round: {task: return_mean}}} of the training split of a rounds.csv."""
-    returns = {}
-    skipped = 0
-    for number, fields in read_csv(path, HEADER):
-        where = "%s line %d" % (path, number)
-        row = dict(zip(HEADER.split(","), fields))
-        round_, task = to_int(where, "round", row["round"]), to_int(where, "task", row["task"])
-        for key in ("return_mean", "return_std", "episodes", "env_steps", "updates", "wall_s"):
-            row[key] = to_number(where, key, row[key])
-        if row["policy"] not in ("personal", "meta") or row["split"] not in ("train", "test"):
-            raise PlotError("%s: split and policy are '%s' and '%s' but must be train or test, and "
-                            "personal or meta." % (where, row["split"], row["policy"]))
-        if round_ < 1 or task < 0:
-            raise PlotError("%s: round %d, task %d is out of range." % (where, round_, task))
-        if row["split"] == "test":
-            skipped += 1
-            continue
-        by_task = returns.setdefault(row["policy"], {}).setdefault(round_, {})
-        if task in by_task:
-            raise PlotError("%s repeats round %d, task %d, %s." % (where, round_, task,
-                                                                  row["policy"]))
-        by_task[task] = row["return_mean"]
-    if skipped:
-        warn("%s: %d rows of test tasks are not drawn." % (path, skipped))
-    return returns
-
-
-def read_text(path):
-    try:
-        with open(path, encoding="utf-8") as file:
-            return file.read()
-    except UnicodeDecodeError:
-        raise PlotError("%s is not a text file." % path)
-
-
-def read_csv(path, header=None):
-    """(line number, fields) of every row below the header; without `header` any will do."""
-    text = read_text(path)
-    if not text:
-        raise PlotError("%s line 1: the file is empty." % path)
-    lines = text.split("\n")
-    if header is not None and lines[0] != header:
-        raise PlotError("%s line 1: the header must be '%s'." % (path, header))
-    if lines[-1] != "":
-        raise PlotError("%s line %d is truncated: it does not end." % (path, len(lines)))
-    columns = lines[0].count(",") + 1
-    rows = []
-    for number, line in enumerate(lines[1:-1], start=2):
-        fields = line.split(",")
-        if len(fields) != columns:
-            raise PlotError("%s line %d has %d fields instead of %d."
-                            % (path, number, len(fields), columns))
-        rows.append((number, fields))
-    return rows
-
-
-def to_number(where, key, text):
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise PlotError("%s: %s is '%s', not a finite number." % (where, key, text))
-    return value
-
-
-def to_int(where, key, text):
-    try:
-        return int(text)
-    except ValueError:
-        raise PlotError("%s: %s is '%s', not a whole number." % (where, key, text))
-
-
-def read_yaml(path):
-    try:
-        data = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = " line %d" % (mark.line + 1) if mark else ""
-        raise PlotError("%s%s is not valid YAML." % (path, line))
-    if not isinstance(data, dict):
-        raise PlotError("%s must hold settings as 'key: value' lines." % path)
-    return data
+def _task_names(manifest, count):
+    """What tells each task from the others, from their descriptions: "zeta 3", …"""
+    tasks = manifest.get("tasks")
+    known = {task.get("task"): str(task.get("description") or "").split(", ")
+             for task in (tasks if isinstance(tasks, list) else []) if isinstance(task, dict)}
+    parts = [known.get(task, [""]) for task in range(count)]
+    if len(set(map(len, parts))) == 1:
+        differ = [i for i in range(len(parts[0])) if len(set(p[i] for p in parts)) > 1]
+        parts = [[p[i] for i in differ] for p in parts]
+    return [", ".join(p) or "task %d" % task for task, p in enumerate(parts)]
 
 
 def _required(folder, manifest, key, kind):
@@ -328,6 +241,27 @@ class Group:
         """Mean over the rounds: the area under the curve, in units of return."""
         return self.curves(policy).mean(axis=1)
 
+    def best(self, policy):
+        """The largest mean over the tasks in any round: what the paper calls best."""
+        return self.curves(policy).max(axis=1)
+
+    def fresh(self, snapshot, policies):
+        """Mean over the tasks on fresh episodes, of the seeds that have it."""
+        return np.array([run.fresh[snapshot, policies].mean() for run in self.runs
+                         if (snapshot, policies) in run.fresh])
+
+    def by_task(self, policies, snapshot):
+        """(seeds x tasks, "fresh" or "evaluation"), or None if there is none of it."""
+        if all((snapshot, policies) in run.fresh for run in self.runs):
+            return np.array([run.fresh[snapshot, policies] for run in self.runs]), "fresh"
+        if policies not in self.policies:
+            return None
+        return np.array([run.by_task(policies, snapshot) for run in self.runs]), "evaluation"
+
+    @property
+    def deep(self):
+        return self.settings.get("learner", "q_learning") != "q_learning"
+
     def optimal(self):
         values = [run.optimal for run in self.runs]
         return None if None in values else float(np.mean(values))
@@ -354,6 +288,10 @@ def group_runs(runs):
                                    g.algorithm, [sort_key(g.settings.get(k)) for k in keys]))
         for group in groups:
             group.label = " ".join([group.label] + setting_texts(group, keys))
+            without = sum(not run.fresh for run in group.runs)
+            if 0 < without < len(group.runs):
+                warn("%d of the %d runs of %s, %s, have no final.csv: fresh returns are over the "
+                     "others." % (without, len(group.runs), experiment, group.label))
             commits = sorted(set(run.commit for run in group.runs))
             if len(commits) > 1:
                 warn("the runs of %s, %s, come from %d versions of the code: %s."
@@ -370,7 +308,9 @@ def _one_a_seed(runs):
         if old is not None and not _same_curves(old, run):
             warn("%s is left out: %s has the same settings and seed, is newer, and differs."
                  % (old.folder, run.folder))
-        newest[run.seed] = run
+        # the same run once more, without fresh episodes, tells less
+        if old is None or run.fresh or not old.fresh or not _same_curves(old, run):
+            newest[run.seed] = run
     return list(newest.values())
 
 

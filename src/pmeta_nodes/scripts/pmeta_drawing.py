@@ -1,0 +1,88 @@
+"""What every figure of pMeta shares: colours, style, panels, legends, and the files written."""
+
+import os
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+# Okabe and Ito's colours, told apart by colour-blind readers as well
+BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
+PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#666666"
+PALETTE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
+STYLE = {
+    "font.size": 10, "axes.titlesize": 10.5, "axes.labelsize": 10, "legend.fontsize": 9.5,
+    "xtick.labelsize": 9.5, "ytick.labelsize": 9.5, "axes.grid": True, "grid.linewidth": 0.4,
+    "grid.color": "#cccccc", "axes.axisbelow": True, "axes.spines.top": False,
+    "axes.spines.right": False, "axes.linewidth": 0.8, "lines.linewidth": 1.7,
+    "lines.markersize": 4.5, "legend.frameon": False, "savefig.dpi": 150, "pdf.fonttype": 42,
+}
+
+
+def style():
+    return plt.rc_context(STYLE)
+
+
+class Figures:
+    """Writes figures into one folder and remembers what it wrote."""
+
+    def __init__(self, out, formats):
+        self.out = out
+        self.formats = formats
+        self.written = []
+
+    def save(self, figure, name):
+        """Writes and closes the figure; `name` may lie in a folder below `out`."""
+        os.makedirs(os.path.dirname(os.path.join(self.out, name)), exist_ok=True)
+        for extension in self.formats:
+            path = os.path.join(self.out, name + "." + extension)
+            # no date in the file: the same runs give the same bytes
+            figure.savefig(path, metadata={"CreationDate": None} if extension == "pdf" else None)
+            self.written.append(path)
+        plt.close(figure)
+
+    def write(self, text, name):
+        """Writes a table that belongs to the figures."""
+        path = os.path.join(self.out, name)
+        os.makedirs(os.path.dirname(path), exist_ok=True)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        self.written.append(path)
+
+
+def panels(rows, columns, sharey=True, panel_width=None):
+    """Axes rows x columns; unless their width is given, with room for a legend on the right."""
+    width = 3.3 * columns + 2.6 if columns > 1 else 7.2
+    if panel_width is not None:
+        width = panel_width * columns
+    return plt.subplots(rows, columns, squeeze=False, sharey=sharey,
+                        figsize=(width, 3.4 * rows + 0.3), constrained_layout=True)
+
+
+def legend_right(axes):
+    """One legend for all panels of a row, beside the last."""
+    entries = {}
+    for axis in axes:
+        for handle, label in zip(*axis.get_legend_handles_labels()):
+            entries.setdefault(label, handle)
+    axes[-1].legend(list(entries.values()), list(entries), loc="center left",
+                    bbox_to_anchor=(1.02, 0.5), borderaxespad=0, handlelength=2.6,
+                    ncol=1 + len(entries) // 16)
+
+
+def headline(figure, text):
+    figure.suptitle(text.replace("$", "\\$"), x=0.01, ha="left", fontsize=11)
+
+
+def spread_ticks(axis, values):
+    """The values themselves as ticks, without those that would touch."""
+    place = np.log(values) if axis.get_xscale() == "log" else values
+    gap = 0.035 * (max(len("%g" % v) for v in values) + 0.7) * (place.max() - place.min())
+    ticks, last = [], -np.inf
+    for value, x in zip(values, place):
+        if x - last >= gap:
+            ticks.append(value)
+            last = x
+    return ticks

@@ -1,0 +1,321 @@
+"""Tables of pMeta's runs: the summary as text and CSV, the paper's two tables as LaTeX."""
+
+import csv
+import io
+import os
+
+import numpy as np
+
+import pmeta_runs as pr
+from pmeta_files import SNAPSHOTS
+
+WIDTH = 120
+BEST_HEADS = {"best": "best", "fresh_best": "fresh (best)", "fresh_last": "fresh (last)"}
+COLUMNS = ("experiment", "group", "algorithm", "lambda", "seeds", "pp_last_mean", "pp_last_std",
+           "mp_last_mean", "mp_last_std", "pp_auc_mean", "pp_auc_std", "mp_auc_mean",
+           "mp_auc_std", "pairs", "mp_minus_ma_auc", "mp_minus_ma_auc_se", "pp_minus_ma_auc",
+           "pp_minus_ma_auc_se", "pp_best_mean", "pp_best_std", "mp_best_mean", "mp_best_std",
+           "fresh_seeds") + tuple(
+               "%s_fresh_%s_%s" % (name, snapshot, what) for snapshot in SNAPSHOTS
+               for name in ("pp", "mp", "all") for what in ("mean", "std"))
+TASK_COLUMNS = ("experiment", "group", "snapshot", "policies", "episodes", "task", "name", "seeds",
+                "mean", "std", "min", "max")
+
+# "On the Convergence Theory of Meta Reinforcement Learning with Personalized Policies":
+# by_lambda is its table "Effect of regularization lambda" (which calls MountainCar's rows GM, PM),
+# best its table "Best average return comparison results for each algorithm on the Gym suites".
+PAPER = {
+    "cart_pole": {
+        "by_lambda": {
+            "mp": {5: (185.11, 2.52), 20: (192.54, 1.56), 30: (191.51, 1.23), 50: (190.86, 2.09)},
+            "pp": {5: (196.47, 0.89), 20: (197.13, 0.45), 30: (196.53, 1.03), 50: (196.72, 0.68)}},
+        "best": {("independent", "pp"): (198.05, 1.03), ("independent", "all"): (169.20, 2.89),
+                 ("model_averaging", "mp"): (191.92, 1.36),
+                 ("pmeta", "mp"): (192.54, 2.54), ("pmeta", "pp"): (197.13, 0.45)}},
+    "mountain_car": {
+        "by_lambda": {
+            "mp": {5: (-111.15, 4.31), 20: (-107.08, 3.21), 30: (-110.49, 3.89),
+                   50: (-108.41, 2.78)},
+            "pp": {5: (-93.05, 1.07), 20: (-92.13, 0.95), 30: (-92.41, 1.25), 50: (-98.16, 2.13)}},
+        "best": {("independent", "pp"): (-92.96, 2.08), ("independent", "all"): (-133.96, 3.25),
+                 ("model_averaging", "mp"): (-111.34, 5.95),
+                 ("pmeta", "mp"): (-107.15, 4.10), ("pmeta", "pp"): (-93.05, 0.95)}},
+}
+PAPER_LAMBDA = 20  # of its best table
+POLICIES = {"pp": "personal", "mp": "meta", "all": "all"}
+GREEK = {"α": r"$\alpha$", "β": r"$\beta$", "γ": r"$\gamma$", "η": r"$\eta$", "λ": r"$\lambda$"}
+
+
+def summary_rows(experiments):
+    """A dict a group with COLUMNS; what is not known (one seed, no baseline) is None."""
+    rows = []
+    for experiment, groups in experiments.items():
+        for group in groups:
+            row = dict.fromkeys(COLUMNS)
+            row.update(experiment=experiment, group=group.label, algorithm=group.algorithm,
+                       seeds=len(group.runs), fresh_seeds=sum(bool(r.fresh) for r in group.runs))
+            if group.algorithm == "pmeta":
+                row["lambda"] = group.settings.get("personal.lambda")
+            # only the summary's text and LaTeX ask for it
+            row["learner"] = group.settings.get("learner")
+            for name, policy in POLICIES.items():
+                if policy in group.policies:
+                    for measure in ("last", "auc", "best"):
+                        _enter(row, "%s_%s" % (name, measure), getattr(group, measure)(policy))
+                # those of pMeta-RL are not run on each other's tasks, or not in every seed
+                for snapshot in SNAPSHOTS:
+                    _enter(row, "%s_fresh_%s" % (name, snapshot), group.fresh(snapshot, policy))
+            if group.algorithm == "pmeta":
+                row.update(paired_differences(group, pr.baseline_of(group, groups)))
+            rows.append(row)
+    return rows
+
+
+def _enter(row, name, values):
+    if len(values):
+        row[name + "_mean"] = float(values.mean())
+    if len(values) > 1:
+        row[name + "_std"] = float(values.std(ddof=1))
+
+
+def paired_differences(group, baseline):
+    """AUC of pMeta-RL less that of model averaging's meta-policy, seed by seed."""
+    if baseline is None or "meta" not in baseline.policies:
+        return {}
+    seeds = [seed for seed in group.seeds if seed in baseline.seeds]
+    found = {"pairs": len(seeds)}
+    for policy, name in (("meta", "mp"), ("personal", "pp")):
+        if not seeds or policy not in group.policies:
+            continue
+        ours = dict(zip(group.seeds, group.auc(policy)))
+        theirs = dict(zip(baseline.seeds, baseline.auc("meta")))
+        differences = np.array([ours[seed] - theirs[seed] for seed in seeds])
+        found["%s_minus_ma_auc" % name] = float(differences.mean())
+        if len(seeds) > 1:
+            found["%s_minus_ma_auc_se" % name] = float(
+                differences.std(ddof=1) / np.sqrt(len(seeds)))
+    return found
+
+
+def csv_text(columns, rows):
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for row in rows:
+        writer.writerow("" if row[c] is None else row[c] for c in columns)
+    return text.getvalue()
+
+
+def summary_text(rows):
+    """For each experiment a table of its learning and one of its best returns."""
+    lines = []
+    for experiment in dict.fromkeys(row["experiment"] for row in rows):
+        members = [row for row in rows if row["experiment"] == experiment]
+        lines += ["experiment %s: learning" % experiment]
+        lines += aligned(("group", "seeds", "PP last", "MP last", "PP AUC", "MP AUC", "MP - MA",
+                          "PP - MA"), [learning_cells(row) for row in members])
+        lines += ["", "experiment %s: best returns" % experiment]
+        lines += best_table(experiment, members)
+        lines.append("")
+    lines += ["Returns are means over the training tasks, as mean ± standard deviation over seeds.",
+              "PP: personal policies. MP: meta-policy. last: at the last round. AUC: mean over the",
+              "rounds. MP - MA, PP - MA: AUC less that of model averaging's meta-policy, paired by",
+              "seed, as mean ± standard error. best: the largest in any round, on that round's",
+              "evaluation episodes, as the paper has it."]
+    if any(row["fresh_seeds"] for row in rows):
+        lines += ["fresh (best), fresh (last): the policies of that round and of the last round, on",
+                  "episodes that had no part in the choice."]
+    if any(row["all_fresh_best_mean"] is not None for row in rows):
+        lines += ["all: every personal policy on every task, mean over all pairs (the paper's DQN;",
+                  "its DQN* is the PP of independent)."]
+    if any(row["experiment"] in PAPER for row in rows):
+        lines += ["paper, λ and paper, best: its table by λ and its table of best returns, whatever",
+                  "the other settings here."]
+    lines.append("-: not run.")
+    return "\n".join(lines) + "\n"
+
+
+def learning_cells(row):
+    return (row["group"], str(row["seeds"])) + tuple(
+        plus_minus(row[mean], row[spread]) for mean, spread in (
+            ("pp_last_mean", "pp_last_std"), ("mp_last_mean", "mp_last_std"),
+            ("pp_auc_mean", "pp_auc_std"), ("mp_auc_mean", "mp_auc_std"),
+            ("mp_minus_ma_auc", "mp_minus_ma_auc_se"), ("pp_minus_ma_auc", "pp_minus_ma_auc_se")))
+
+
+def best_table(experiment, rows):
+    measures = [m for m, head in BEST_HEADS.items()
+                if m == "best" or any(row["fresh_seeds"] for row in rows)]
+    heads = ("group", "policy") + tuple(BEST_HEADS[m] for m in measures)
+    if experiment in PAPER:
+        heads += ("paper, λ", "paper, best")
+    lines = []
+    for row in rows:
+        label = row["group"]
+        for name, policy in best_policies(row):
+            cells = (label, policy) + tuple(value_of(row, name, m) for m in measures)
+            if experiment in PAPER:
+                cells += tuple(plus_minus(*pair) for pair in paper_values(row, name))
+            lines.append(cells)
+            label = ""
+    return aligned(heads, lines, left=2)
+
+
+def best_policies(row):
+    """[(pp, mp or all, its name)] of which the group has a return."""
+    deep = row["algorithm"] == "independent" and row["learner"] == "dqn"
+    names = {"pp": "PP (DQN*)" if deep else "PP", "mp": "MP",
+             "all": "all (DQN)" if deep else "all"}
+    return [(name, text) for name, text in names.items()
+            if row["%s_fresh_best_mean" % name] is not None
+            or row.get("%s_best_mean" % name) is not None]
+
+
+def value_of(row, name, measure):
+    key = "%s_%s_" % (name, measure)
+    return plus_minus(row.get(key + "mean"), row.get(key + "std"))
+
+
+def paper_values(row, name):
+    """Mean and deviation in the paper's table by lambda, and in its table of best returns."""
+    known = PAPER[row["experiment"]]
+    unknown = (None, None)
+    strength = row["lambda"]
+    by_lambda = known["by_lambda"].get(name, {}).get(strength, unknown)
+    if row["algorithm"] == "pmeta" and strength != PAPER_LAMBDA:
+        return by_lambda, unknown
+    return by_lambda, known["best"].get((row["algorithm"], name), unknown)
+
+
+def aligned(heads, lines, left=1):
+    """Lines of a table at most WIDTH wide: where it would be wider, labels stand above."""
+    table = [heads] + lines
+    widths = [max(len(line[i]) for line in table) for i in range(len(heads))]
+    above = 2 * len(widths) + sum(widths) > WIDTH
+    first = 1 if above else 0
+    found = []
+    for line in table:
+        if above and line[0]:
+            found.append("  " + line[0])
+        cells = [c.ljust(w) if i < left else c.rjust(w)
+                 for i, (c, w) in enumerate(zip(line, widths))]
+        found.append(("  " * (1 + first) + "  ".join(cells[first:])).rstrip())
+    return found
+
+
+def plus_minus(mean, spread, sign="±"):
+    if mean is None:
+        return "-"
+    decimals = 2 if abs(mean) < 1000 else 1
+    text = "%.*f" % (decimals, mean)
+    return text if spread is None else text + " %s %.*f" % (sign, decimals, spread)
+
+
+def latex(text):
+    for old, new in [("\\", r"\textbackslash "), ("_", r"\_"), ("%", r"\%"), ("&", r"\&"),
+                     ("#", r"\#")] + list(GREEK.items()):
+        text = text.replace(old, new)
+    return text
+
+
+def latex_cell(row, name, measure, bold=False):
+    if row is None or row.get("%s_%s_mean" % (name, measure)) is None:
+        return "--"
+    key = "%s_%s_" % (name, measure)
+    text = "$" + plus_minus(row[key + "mean"], row[key + "std"], r"\pm") + "$"
+    return r"{\boldmath %s}" % text if bold else text
+
+
+def best_returns_tex(rows):
+    """Rows algorithms and columns experiments, as the paper's table of best returns."""
+    experiments = list(dict.fromkeys(row["experiment"] for row in rows))
+    columns = [(e, m) for e in experiments for m in ("best", "fresh_best") if m == "best" or any(
+        row["fresh_seeds"] for row in rows if row["experiment"] == e)]
+    found = {}
+    for row in rows:
+        for name, policy in best_policies(row):
+            found.setdefault("%s, %s" % (row["group"], policy), {})[row["experiment"]] = row, name
+    lines = [" & ".join(["Algorithm"] + [r"\multicolumn{%d}{c}{%s}" % (
+        sum(c[0] == e for c in columns), latex(e)) for e in experiments]) + r" \\"]
+    lines.append(" & ".join([""] + [BEST_HEADS[m].split(" ")[0] for _, m in columns]) + r" \\")
+    lines.append(r"\midrule")
+    for label, by_experiment in found.items():
+        cells = [latex_cell(*by_experiment.get(e, (None, "")), m) for e, m in columns]
+        lines.append(" & ".join([latex(label)] + cells) + r" \\")
+    caption = ("Best average returns, mean $\\pm$ standard deviation over seeds. Best: the largest "
+               "in any round; fresh: the policies of that round on fresh episodes.")
+    return latex_table(caption, "l" + "c" * len(columns), lines)
+
+
+def lambda_table_tex(experiments, rows):
+    """Columns lambda and rows MP and PP, as the paper's "Effect of regularization", or None."""
+    by_label = {(row["experiment"], row["group"]): row for row in rows}
+    blocks = []
+    for experiment, groups in experiments.items():
+        pmeta = [group for group in groups if group.algorithm == "pmeta"]
+        for members in pr.slices(pmeta, "personal.lambda"):
+            fixed = pr.fixed_texts(members[0], pmeta, "personal.lambda")
+            blocks.append((" ".join([experiment] + fixed),
+                           [by_label[experiment, group.label] for group in members]))
+    if not blocks:
+        return None
+    width = max(len(members) for _, members in blocks)
+    lines = []
+    for i, (label, members) in enumerate(blocks):
+        lines += [r"\midrule"] if i else []
+        pad = [""] * (width - len(members))
+        lines.append(" & ".join([latex(label)] + [r"$\lambda=%s$" % pr.value_text(row["lambda"])
+                                                  for row in members] + pad) + r" \\")
+        lines.append(r"\cmidrule{2-%d}" % (len(members) + 1))
+        for measure, suffix in (("best", ""), ("fresh_best", ", fresh")):
+            for name in ("mp", "pp"):
+                values = [row["%s_%s_mean" % (name, measure)] for row in members]
+                if any(value is not None for value in values):
+                    top = max(round(v, 2) for v in values if v is not None)
+                    cells = [latex_cell(row, name, measure, v is not None and round(v, 2) == top)
+                             for row, v in zip(members, values)]
+                    lines.append(" & ".join([name.upper() + suffix] + cells + pad) + r" \\")
+    caption = ("Effect of regularization $\\lambda$: best average return of pMeta-RL, mean $\\pm$ "
+               "standard deviation over seeds.")
+    return latex_table(caption, "l" + "c" * width, lines)
+
+
+def latex_table(caption, columns, lines):
+    return "\n".join(
+        ["% from summary.csv; needs \\usepackage{booktabs}", r"\begin{table}[htbp]",
+         r"  \centering", r"  \caption{%s}" % caption, r"  \begin{tabular}{%s}" % columns,
+         r"    \toprule"] + ["    " + line for line in lines]
+        + [r"    \bottomrule", r"  \end{tabular}", r"\end{table}"]) + "\n"
+
+
+def task_csv(experiment, groups):
+    """Returns task by task of every group, at the best round and at the last."""
+    rows = []
+    for group in groups:
+        for snapshot in SNAPSHOTS:
+            for policies in POLICIES.values():
+                data = group.by_task(policies, snapshot)
+                for task in range(group.runs[0].num_tasks if data else 0):
+                    values = data[0][:, task]
+                    values = values[np.isfinite(values)]
+                    if len(values):
+                        std = float(values.std(ddof=1)) if len(values) > 1 else None
+                        rows.append(dict(zip(TASK_COLUMNS, (
+                            experiment, group.label, snapshot, policies, data[1], task,
+                            group.runs[0].task_names[task], len(values), float(values.mean()), std,
+                            float(values.min()), float(values.max())))))
+    return csv_text(TASK_COLUMNS, rows)
+
+
+def write_tables(experiments, rows, out):
+    """Writes what there are rows for; returns the paths."""
+    texts = {"summary.txt": summary_text(rows), "summary.csv": csv_text(COLUMNS, rows),
+             "best_returns.tex": best_returns_tex(rows),
+             "lambda_table.tex": lambda_table_tex(experiments, rows)} if rows else {}
+    written = []
+    for name, text in texts.items():
+        if text is not None:
+            written.append(os.path.join(out, name))
+            with open(written[-1], "w", encoding="utf-8") as file:
+                file.write(text)
+    return written
