@@ -47,7 +47,8 @@ BAD_SETTINGS = [
     ("lambda:=50", "personal.alpha = 0.08 with personal.lambda = 50 diverges: alpha must be below "
                    "2 / (1 + lambda + gamma) = 0.0385356."),
     ("environment.name:=gridwold",
-     "unknown environment 'gridwold': did you mean 'gridworld'? Known are gridworld."),
+     "unknown environment 'gridwold': did you mean 'gridworld'? Known are cart_pole, gridworld, "
+                                  "mountain_car."),
     ("rounds:=2.5",
      "rounds is '2.5' (given as rounds:=2.5) but must be a whole number, from 1 to 1e+06."),
 ]

@@ -8,6 +8,7 @@
 #include "conversions.h"
 #include "node_main.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/run/policy_file.h"
 
 namespace pmeta_nodes {
 namespace {
@@ -110,17 +111,20 @@ void MetaAggregatorNode::runRounds() {
     closeRoundIfDue();
     announceLateness();
   }
-  if (book_.roundsTaken() == rounds) {
+  const bool finished = book_.roundsTaken() == rounds;
+  if (!finished) writeCompleteRounds(true);
+  const pmeta::MetaPolicy& meta = aggregator_.metaPolicy();
+  if (meta.round > 0) {
+    pmeta::saveRunPolicy(experiment_, pmeta::Policy::kMeta, -1, meta.round, meta.model);
+  }
+  if (finished) {
     log_.finish("finished");
     publishRound(RoundSummary::FINISHED, "all rounds are done; results in " + log_.dir());
     ROS_INFO("finished; results in %s", log_.dir().c_str());
   } else {
-    writeCompleteRounds(true);
     log_.finish("stopped");
-    publishRound(RoundSummary::STOPPED,
-                 "stopped in round " + std::to_string(aggregator_.metaPolicy().round + 1));
-    ROS_WARN("stopped in round %d; what was done is in %s", aggregator_.metaPolicy().round + 1,
-             log_.dir().c_str());
+    publishRound(RoundSummary::STOPPED, "stopped in round " + std::to_string(meta.round + 1));
+    ROS_WARN("stopped in round %d; what was done is in %s", meta.round + 1, log_.dir().c_str());
   }
 }
 

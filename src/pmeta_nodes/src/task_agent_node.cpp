@@ -7,6 +7,7 @@
 #include "conversions.h"
 #include "node_main.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/run/policy_file.h"
 
 namespace pmeta_nodes {
 namespace {
@@ -182,10 +183,22 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     status_.loss = result->loss;
     status_.distance_to_meta = result->distance;
   }
+  // before the aggregator can end the run, and with it this process
+  if (round == rounds) savePersonal();
   deliver(result->personal);
   deliver(result->update);
   if (trajectory_pub_) publishEpisode(agent_.recordPersonal(), round, pmeta::Policy::kPersonal);
   setState(AgentStatus::WAITING, "waiting for the meta-policy of round " + std::to_string(round));
+}
+
+void TaskAgentNode::savePersonal() const {
+  try {
+    pmeta::saveRunPolicy(experiment_, pmeta::Policy::kPersonal, agent_.task(),
+                         experiment_.settings().rounds, agent_.personal());
+  } catch (const pmeta::Error& error) {
+    // the others can do without this machine's file
+    ROS_ERROR("the personal policy is not kept: %s", error.what());
+  }
 }
 
 void TaskAgentNode::waitForAggregator() {

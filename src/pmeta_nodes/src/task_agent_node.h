@@ -28,7 +28,8 @@ namespace pmeta_nodes {
 ///
 /// Subscribes to meta_policy and round; publishes auxiliary, returns, agent_status and
 /// task_<i>/trajectory. What the aggregator must get is sent again until a newer meta-policy, or
-/// the end of the run, shows that it has it.
+/// the end of the run, shows that it has it. The last round's personal policy stays on this
+/// machine, as policies/task_<i>.safetensors of the run folder.
 class TaskAgentNode {
  public:
   TaskAgentNode(const pmeta::Experiment& experiment, int task);
@@ -45,6 +46,7 @@ class TaskAgentNode {
 
   void train();
   void trainFrom(const pmeta::MetaPolicy& meta);
+  void savePersonal() const;
   void waitForAggregator();
   void deliver(const pmeta::TaskReturn& result);
   void deliver(const pmeta::AuxiliaryUpdate& update);

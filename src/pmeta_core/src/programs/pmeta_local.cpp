@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -17,6 +18,7 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/env/trajectory_check.h"
+#include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/run/local_runner.h"
 #include "pmeta_core/run/sweep.h"
 #include "pmeta_core/theory/convergence.h"
@@ -39,6 +41,10 @@ constexpr char kUsage[] =
   replay KIND FILE [--tasks FILE]      simulate recorded trajectories (CSV, also gzip) again and
                                        compare. KIND: cartpole, mountaincar. The tasks are the
                                        paper's unless a *_tasks.csv is given.
+  evaluate POLICY_FILE [--episodes N] [--task I]
+                                       returns of a trained policy (policies/*.safetensors of a run
+                                       folder) on fresh episodes, at least N (100), of its own task,
+                                       or of every task if it is a meta-policy
 
 CONFIG is a YAML file, e.g. config/gridworld.yaml. A key may be shortened to its last part where that
 is unambiguous (lambda for personal.lambda). Results go to results_dir, by default ~/.ros/pmeta.
@@ -52,8 +58,21 @@ struct Arguments {
   std::vector<std::string> words;  ///< all that is neither an option nor ROS's own remapping
   std::string name;
   std::string tasks;
+  int task = -1;  ///< -1: not given
+  int episodes = 100;
   int jobs = std::max(1u, std::thread::hardware_concurrency());
 };
+
+int wholeNumber(const std::string& option, const std::string& text, int low, int high) {
+  int number = 0;
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, number);
+  if (result.ec != std::errc() || result.ptr != end || number < low || number > high) {
+    throw Error(option + " is '" + text + "' but must be a whole number, from " +
+                std::to_string(low) + " to " + std::to_string(high) + ".");
+  }
+  return number;
+}
 
 Arguments parseArguments(int argc, char** argv) {
   Arguments arguments;
@@ -69,11 +88,11 @@ Arguments parseArguments(int argc, char** argv) {
     } else if (word == "--tasks") {
       arguments.tasks = value(i);
     } else if (word == "--jobs") {
-      const std::string jobs = value(i);
-      arguments.jobs = std::atoi(jobs.c_str());
-      if (arguments.jobs < 1 || arguments.jobs > 1024) {
-        throw Error("--jobs is '" + jobs + "' but must be a whole number, from 1 to 1024.");
-      }
+      arguments.jobs = wholeNumber(word, value(i), 1, 1024);
+    } else if (word == "--task") {
+      arguments.task = wholeNumber(word, value(i), 0, 1000000);
+    } else if (word == "--episodes") {
+      arguments.episodes = wholeNumber(word, value(i), 1, 1000000);
     } else if (word.rfind("-", 0) == 0) {
       throw Error("unknown option '" + word + "': see pmeta_local --help.");
     } else {
@@ -211,6 +230,30 @@ int replay(const Arguments& arguments) {
   return report.ok() ? 0 : 1;
 }
 
+int evaluate(const Arguments& arguments) {
+  if (arguments.words.size() != 1) {
+    throw Error("evaluate needs one policy file, e.g. RUN_FOLDER/policies/task_0.safetensors.");
+  }
+  const pmeta::LoadedPolicy policy(arguments.words[0]);
+  const Experiment& experiment = policy.experiment();
+  if (arguments.task >= experiment.numTasks()) {
+    throw Error("--task is " + std::to_string(arguments.task) + " but must be from 0 to " +
+                std::to_string(experiment.numTasks() - 1) + ".");
+  }
+  std::cout << policy.description() << "\n";
+  const int only = arguments.task < 0 ? policy.task() : arguments.task;
+  for (int task = 0; task < experiment.numTasks() && !g_stop; ++task) {
+    if (only >= 0 && task != only) continue;
+    const pmeta::ReturnStats stats =
+        pmeta::TaskAgent(experiment, task).evaluateFresh(policy.model(), arguments.episodes);
+    std::printf("task %d %s  return %s +- %s over %d episodes\n", task,
+                experiment.family().taskName(task).c_str(), shortNumber(stats.mean).c_str(),
+                shortNumber(stats.std).c_str(), stats.episodes);
+    std::fflush(stdout);
+  }
+  return g_stop ? 130 : 0;
+}
+
 int dispatch(int argc, char** argv) {
   const std::string command = argc > 1 ? argv[1] : "";
   const bool wants_help = std::any_of(argv + 1, argv + argc, [](const char* word) {
@@ -226,6 +269,7 @@ int dispatch(int argc, char** argv) {
   if (command == "check") return check(parseArguments(argc, argv));
   if (command == "settings") return settings(parseArguments(argc, argv));
   if (command == "replay") return replay(parseArguments(argc, argv));
+  if (command == "evaluate") return evaluate(parseArguments(argc, argv));
   std::cerr << (command.empty() ? "" : "unknown command '" + command + "'\n") << kUsage;
   return 2;
 }

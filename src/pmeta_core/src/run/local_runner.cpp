@@ -3,8 +3,20 @@
 #include <chrono>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/run/policy_file.h"
 
 namespace pmeta {
+namespace {
+
+void savePolicies(const Experiment& experiment, const MetaPolicy& meta,
+                  const std::vector<TaskAgent>& agents) {
+  saveRunPolicy(experiment, Policy::kMeta, -1, meta.round, meta.model);
+  for (const TaskAgent& agent : agents) {
+    saveRunPolicy(experiment, Policy::kPersonal, agent.task(), meta.round, agent.personal());
+  }
+}
+
+}  // namespace
 
 LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound& on_round) {
   MetaAggregator aggregator(experiment);
@@ -45,6 +57,7 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
       writeFileAtomically(log->dir() + "/final.csv", FreshEvaluation::csv(result.fresh));
     }
   }
+  if (log != nullptr) savePolicies(experiment, aggregator.metaPolicy(), agents);
   result.meta = aggregator.metaPolicy().model;
   return result;
 }

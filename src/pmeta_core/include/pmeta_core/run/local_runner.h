@@ -24,7 +24,8 @@ struct LocalResult {
 using OnRound = std::function<bool(const RoundSummary&)>;
 
 /// Runs the whole experiment in this process and thread, with the very classes the nodes use and
-/// the same result bit for bit. Files are written if `log` is given.
+/// the same result bit for bit. Files are written if `log` is given: those of RunLog, and the last
+/// policies below policies/, a stopped run's too.
 LocalResult runLocally(const Experiment& experiment, RunLog* log = nullptr,
                        const OnRound& on_round = {});
 

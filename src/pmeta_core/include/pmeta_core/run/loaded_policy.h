@@ -1,0 +1,55 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "pmeta_core/base/model.h"
+#include "pmeta_core/env/env.h"
+#include "pmeta_core/env/tabular_env.h"
+#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/run/policy_file.h"
+#include "pmeta_core/run/protocol.h"
+
+namespace pmeta {
+
+/// A trained policy from a file, ready to act; the file is all it needs.
+class LoadedPolicy {
+ public:
+  /// Reads the file and rebuilds its experiment. Throws Error if the file is none of a policy, or
+  /// its parameters do not fit its own settings.
+  explicit LoadedPolicy(const std::string& path);
+  ~LoadedPolicy();
+  LoadedPolicy(LoadedPolicy&&) noexcept;
+
+  const Experiment& experiment() const { return experiment_; }
+  const EnvSpec& spec() const { return env_->spec(); }
+  const Model& model() const { return model_; }
+  Policy policy() const { return policy_; }
+  int task() const { return task_; }    ///< whose personal policy it is; -1 for a meta-policy
+  int round() const { return round_; }  ///< rounds of training behind it
+  /// For people, e.g. "personal policy of grid_4x4, round 10 of run RUN".
+  std::string description() const;
+
+  /// The greedy action (spec().action_size numbers) of an observation (spec().observation_size
+  /// numbers); the lowest of equally good ones. False, and no action, if the observation is not
+  /// finite or, for a table, of no state that the policy has values of. Allocates nothing.
+  bool act(const double* observation, double* action);
+
+ private:
+  struct Network;
+
+  LoadedPolicy(const std::string& path, PolicyFile file);
+  bool actFromTable(const double* observation, double* action) const;
+  bool actFromNetwork(const double* observation, double* action);
+
+  Experiment experiment_;
+  Model model_;
+  Policy policy_ = Policy::kMeta;
+  int task_ = -1;
+  int round_ = 0;
+  std::unique_ptr<Env> env_;  ///< of its task, or of task 0 for a meta-policy
+  const TabularEnv* table_ = nullptr;
+  std::unique_ptr<Network> network_;
+};
+
+}  // namespace pmeta

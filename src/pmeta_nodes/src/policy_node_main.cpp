@@ -1,0 +1,56 @@
+#include <csignal>
+#include <cstring>
+#include <iostream>
+
+#include "pmeta_core/base/error.h"
+#include "policy_node.h"
+
+namespace {
+
+constexpr char kHelp[] =
+    R"(policy_node: acts with a trained policy from a file.
+
+  rosrun pmeta_nodes policy_node _policy:=RUN_FOLDER/policies/task_0.safetensors
+
+private parameters
+  ~policy      policy file of a run (required); nothing else is needed
+subscribes   observation (std_msgs/Float64MultiArray): as many numbers as the environment's have
+publishes    action (std_msgs/Float64MultiArray): the greedy action, one number if it is discrete;
+             /diagnostics
+An observation of a wrong size, or that is not finite, gets a warning and no action.
+)";
+
+void onSignal(int) { ros::requestShutdown(); }
+
+void act() {
+  std::string path;
+  if (!ros::NodeHandle("~").getParam("policy", path) || path.empty()) {
+    throw pmeta::Error(
+        "which policy? Give the private parameter policy, e.g. "
+        "_policy:=RUN_FOLDER/policies/task_0.safetensors.");
+  }
+  const pmeta_nodes::PolicyNode node(path);
+  ros::spin();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
+      std::cout << kHelp;
+      return 0;
+    }
+  }
+  ros::init(argc, argv, "policy_node");
+  std::signal(SIGTERM, onSignal);
+  // outside the try: the console falls silent when the last node handle goes
+  const ros::NodeHandle nh;
+  try {
+    act();
+    return 0;
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,164 @@
+#include "pmeta_core/run/loaded_policy.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "../allocations.h"
+#include "../support.h"
+#include "pmeta_core/run/local_runner.h"
+
+namespace pmeta {
+namespace {
+
+using test::errorOf;
+using test::gridExperiment;
+using test::TempDir;
+using testing::HasSubstr;
+
+Experiment cartPole(const std::vector<std::string>& overrides = {}) {
+  return Experiment::parse(R"(
+experiment: cart
+run_id: run
+results_dir: /tmp/pmeta_unused
+learner: dqn
+rounds: 2
+updates_per_round: 20
+personal: {learning_rate: 0.003, alpha: 0.001, lambda: 20, eta: 0.01}
+dqn: {hidden: [32, 24], batch_size: 16, buffer_size: 2000, num_envs: 2, evaluation_episodes: 3}
+environment: {name: cart_pole}
+)",
+                           "cart.yaml", overrides);
+}
+
+struct Trained {
+  TempDir dir;
+  Experiment experiment;
+  std::string policies;
+
+  explicit Trained(Experiment plain)
+      : experiment(Experiment::parse(plain.yaml(), "test", {"results_dir:=" + dir.path()})),
+        policies(experiment.runDir() + "/policies/") {
+    RunLog log(experiment);
+    runLocally(experiment, &log);
+  }
+};
+
+// the actions of a whole greedy episode as the learner records it are those of the loaded policy
+void expectActsAsRecorded(LoadedPolicy& policy, int task) {
+  const auto learner = policy.experiment().makeLearner(task);
+  for (std::uint64_t start = 0; start < 5; ++start) {
+    Rng rng(start, 0, Stream::kMeasure);
+    const Episode episode = learner->record(policy.model(), rng);
+    ASSERT_FALSE(episode.actions.empty());
+    for (std::size_t t = 0; t < episode.actions.size(); ++t) {
+      double action = -1;
+      const std::size_t at = t * static_cast<std::size_t>(episode.observation_size);
+      ASSERT_TRUE(policy.act(&episode.observations[at], &action));
+      EXPECT_EQ(action, episode.actions[t]) << "start " << start << ", step " << t;
+    }
+  }
+}
+
+TEST(LoadedPolicy, ActsAsTheTableInMemory) {
+  const Trained run(gridExperiment({"sizes:=[4, 6]"}));
+  for (const int task : {0, 1}) {
+    LoadedPolicy policy(run.policies + "task_" + std::to_string(task) + ".safetensors");
+    EXPECT_EQ(policy.task(), task);
+    EXPECT_EQ(policy.policy(), Policy::kPersonal);
+    expectActsAsRecorded(policy, task);
+  }
+  LoadedPolicy meta(run.policies + "meta.safetensors");
+  EXPECT_EQ(meta.task(), -1);
+  EXPECT_EQ(meta.round(), 10);
+  EXPECT_EQ(meta.description(), "meta-policy of grid, round 10 of run run");
+  expectActsAsRecorded(meta, 1);
+}
+
+TEST(LoadedPolicy, ActsAsTheNetworkInMemory) {
+  for (const std::string dueling : {"false", "true"}) {
+    const Trained run(cartPole({"dueling:=" + dueling}));
+    LoadedPolicy policy(run.policies + "task_2.safetensors");
+    expectActsAsRecorded(policy, 2);
+  }
+}
+
+TEST(LoadedPolicy, RefusesObservationsThatNoStateHas) {
+  const Trained run(gridExperiment({"sizes:=[4, 6]", "rounds:=1"}));
+  LoadedPolicy policy(run.policies + "task_0.safetensors");
+  const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
+  const std::vector<std::vector<double>> unknown = {{nan, 0},  {0, infinity}, {1e300, 0}, {-1, 0},
+                                                    {0, -1e9}, {35, 35},      {3, 3},     {4, 4}};
+  for (const std::vector<double>& observation : unknown) {
+    double action = -1;
+    EXPECT_FALSE(policy.act(observation.data(), &action)) << observation[0];
+    EXPECT_EQ(action, -1);
+  }
+  const std::vector<double> known = {2, 3};
+  double action = -1;
+  EXPECT_TRUE(policy.act(known.data(), &action));
+}
+
+TEST(LoadedPolicy, RefusesObservationsThatAreNotFinite) {
+  const Trained run(cartPole({"rounds:=1"}));
+  LoadedPolicy policy(run.policies + "meta.safetensors");
+  std::vector<double> observation(static_cast<std::size_t>(policy.spec().observation_size), 0.01);
+  double action = -1;
+  EXPECT_TRUE(policy.act(observation.data(), &action));
+  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 1e39}) {
+    observation[1] = bad;
+    EXPECT_FALSE(policy.act(observation.data(), &action));
+  }
+}
+
+TEST(LoadedPolicy, ActingAllocatesNothing) {
+  const Trained grid(gridExperiment({"rounds:=1"})), cart(cartPole({"rounds:=1"}));
+  LoadedPolicy table(grid.policies + "task_4.safetensors");
+  LoadedPolicy network(cart.policies + "meta.safetensors");
+  const std::vector<double> cell = {1, 2};
+  const std::vector<double> observation(static_cast<std::size_t>(network.spec().observation_size));
+  double action = 0;
+  network.act(observation.data(), &action);
+  const std::size_t before = test::allocations();
+  for (int k = 0; k < 100; ++k) {
+    table.act(cell.data(), &action);
+    network.act(observation.data(), &action);
+  }
+  EXPECT_EQ(test::allocations(), before);
+}
+
+TEST(LoadedPolicy, RefusesParametersThatDoNotFitTheirSettings) {
+  const TempDir dir;
+  const std::string path = dir / "policy.safetensors";
+  const Experiment grid = gridExperiment();
+  const auto error = [&](const std::string& key, const std::string& value) {
+    auto metadata = policyMetadata(grid, Policy::kPersonal, 2, 10);
+    metadata[key] = value;
+    if (value.empty()) metadata.erase(key);
+    savePolicy(path, grid.makeLearner(2)->personal(), metadata);
+    return errorOf([&] { LoadedPolicy policy(path); });
+  };
+  ASSERT_EQ(error("unrelated", "text"), "(no error)");
+  EXPECT_EQ(error("settings", ""), "the policy file " + path + " does not say its settings.");
+  EXPECT_THAT(error("settings", gridExperiment({"sizes:=[4, 5, 6]"}).yaml()),
+              HasSubstr("has parameters that do not fit its own settings."));
+  EXPECT_THAT(error("settings", cartPole({"rounds:=10"}).yaml()),
+              HasSubstr("do not fit its own settings."));
+  EXPECT_THAT(error("settings", cartPole({"rounds:=10", "hidden:=[65536, 65536, 65536]"}).yaml()),
+              HasSubstr("do not fit its own settings."));
+  EXPECT_THAT(error("settings", "[[["), HasSubstr("the policy file " + path));
+  EXPECT_THAT(error("settings", std::string(100000, '[')), HasSubstr("the policy file " + path));
+  EXPECT_THAT(error("settings", "lamda: 5\n"), HasSubstr("unknown setting 'lamda'"));
+  EXPECT_EQ(error("task", "5"),
+            "the policy file " + path + " has a task that is no whole number from 0 to 4.");
+  EXPECT_THAT(error("task", "-1"), HasSubstr("has a task that is no whole number"));
+  EXPECT_THAT(error("task", ""), HasSubstr("does not say its task."));
+  EXPECT_THAT(error("round", "99"), HasSubstr("has a round that is no whole number from 0 to 10."));
+  EXPECT_THAT(error("policy", "best"), HasSubstr("is of neither a personal nor a meta policy."));
+}
+
+}  // namespace
+}  // namespace pmeta

@@ -1,0 +1,152 @@
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <spawn.h>
+#include <std_msgs/Float64MultiArray.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include "pmeta_core/run/policy_file.h"
+#include "run_over_ros.h"
+
+extern char** environ;
+
+namespace pmeta_nodes {
+namespace {
+
+using std_msgs::Float64MultiArray;
+
+// starts a program of this package, as late_joiner_test does
+int start(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), {"rosrun", "pmeta_nodes"});
+  arguments.push_back(nullptr);
+  pid_t pid = -1;
+  posix_spawnp(&pid, "rosrun", nullptr, nullptr, const_cast<char**>(arguments.data()), environ);
+  return pid;
+}
+
+class PolicyNodeTest : public RunOverRos {
+ protected:
+  PolicyNodeTest() {
+    const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+    observation_pub_ = nh_.advertise<Float64MultiArray>("observation", 1);
+    action_sub_ = nh_.subscribe("action", 1, &PolicyNodeTest::onAction, this, hints);
+  }
+
+  // sends an observation; the action that comes back within `seconds`
+  std::optional<double> ask(const std::vector<double>& observation, double seconds) {
+    Float64MultiArray msg;
+    msg.data = observation;
+    action_.reset();
+    observation_pub_.publish(msg);
+    const auto limit = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+    while (!action_ && std::chrono::steady_clock::now() < limit) {
+      ros::getGlobalCallbackQueue()->callOne(ros::WallDuration(0.01));
+    }
+    return action_;
+  }
+
+  void onAction(const Float64MultiArray::ConstPtr& msg) {
+    ASSERT_EQ(msg->data.size(), 1u);
+    action_ = msg->data[0];
+  }
+
+  ros::Publisher observation_pub_;
+  ros::Subscriber action_sub_;
+  std::optional<double> action_;
+};
+
+TEST_F(PolicyNodeTest, ARunsPersonalPolicyAnswersObservationsWithItsGreedyAction) {
+  ASSERT_TRUE(waitFor([&] { return finished(); }));
+  const std::string policies = experiment_.runDir() + "/policies/";
+
+  // the same run in this process leaves the same policies
+  char folder[] = "/tmp/pmeta_policy_XXXXXX";
+  ASSERT_NE(mkdtemp(folder), nullptr);
+  const pmeta::Experiment local = pmeta::Experiment::parse(experiment_.yaml(), "the run",
+                                                           {"results_dir:=" + std::string(folder)});
+  pmeta::RunLog log(local);
+  pmeta::runLocally(local, &log);
+  for (const std::string file : {"meta", "task_0", "task_1"}) {
+    const std::string name = file + ".safetensors";
+    const pmeta::PolicyFile mine = pmeta::loadPolicy(log.dir() + "/policies/" + name);
+    pmeta::PolicyFile over_ros = pmeta::loadPolicy(policies + name);
+    EXPECT_TRUE(over_ros.model == mine.model) << name;
+    EXPECT_EQ(over_ros.metadata["round"], "10");
+  }
+  const pmeta::Model model = pmeta::loadPolicy(policies + "task_1.safetensors").model;
+  std::filesystem::remove_all(folder);
+
+  const std::string policy = "_policy:=" + policies + "task_1.safetensors";
+  const int pid = start({"policy_node", policy.c_str(), "__ns:=/pmeta"});
+  ASSERT_TRUE(waitFor(
+      [&] {
+        return observation_pub_.getNumSubscribers() > 0 && action_sub_.getNumPublishers() > 0;
+      },
+      20));
+  ASSERT_TRUE(waitFor([&] { return ask({0, 0}, 0.1).has_value(); }, 10)) << "connected by now";
+
+  for (int cell = 0; cell < 15; ++cell) {
+    const double* values = &model.doubles()[static_cast<std::size_t>(4 * cell)];
+    const auto action = ask({static_cast<double>(cell / 4), static_cast<double>(cell % 4)}, 5);
+    ASSERT_TRUE(action.has_value());
+    EXPECT_EQ(*action, std::max_element(values, values + 4) - values) << "cell " << cell;
+  }
+  for (const std::vector<double>& bad : std::vector<std::vector<double>>{
+           {}, {0}, {0, 0, 0}, {std::nan(""), 0}, {1e300, 0}, {3, 3}}) {
+    EXPECT_FALSE(ask(bad, 0.05).has_value());
+  }
+
+  std::vector<double> microseconds;
+  for (int k = 0; k < 1000; ++k) {
+    const auto sent = std::chrono::steady_clock::now();
+    ASSERT_TRUE(ask({1, 2}, 5).has_value());
+    microseconds.push_back(
+        std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - sent).count());
+  }
+  std::sort(microseconds.begin(), microseconds.end());
+  std::printf("observation to action: median %.0f us, 99 %% below %.0f us, longest %.0f us\n",
+              microseconds[500], microseconds[990], microseconds[999]);
+
+  std::string health;
+  const ros::Subscriber diagnostics = nh_.subscribe<diagnostic_msgs::DiagnosticArray>(
+      "/diagnostics", 16, [&health](const diagnostic_msgs::DiagnosticArray::ConstPtr& msg) {
+        for (const auto& status : msg->status) {
+          if (status.name.find("policy") == std::string::npos) continue;
+          health = status.hardware_id + ": " + status.message + "\n";
+          for (const auto& value : status.values) health += value.key + " " + value.value + "\n";
+        }
+      });
+  EXPECT_TRUE(waitFor([&] { return !health.empty(); }, 10));
+  std::printf("%s", health.c_str());
+  EXPECT_NE(health.find("personal policy of grid_4x4, round 10"), std::string::npos);
+  EXPECT_NE(health.find("refused observations 6\n"), std::string::npos);
+  EXPECT_NE(health.find("mean latency [us] "), std::string::npos);
+
+  kill(pid, SIGINT);
+  int status = -1;
+  waitpid(pid, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+}
+
+TEST_F(PolicyNodeTest, SaysInOneSentenceWhatIsWrong) {
+  // names of their own: a second node of this test's name would end it
+  const std::string text = output(
+      "{ rosrun pmeta_nodes policy_node --help;"
+      " rosrun pmeta_nodes policy_node __name:=a & rosrun pmeta_nodes policy_node __name:=b "
+      "_policy:=/none; wait; }");
+  EXPECT_EQ(text.find("policy_node: acts with a trained policy from a file."), 0u) << text;
+  EXPECT_NE(text.find("which policy? Give the private parameter policy, e.g."), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("cannot read the policy file /none (No such file or directory)."),
+            std::string::npos)
+      << text;
+}
+
+}  // namespace
+}  // namespace pmeta_nodes
+
+PMETA_ROSTEST_MAIN("policy_node_test")
