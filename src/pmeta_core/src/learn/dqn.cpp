@@ -12,7 +12,9 @@ int bestOf(const float* values, int n) {
   return static_cast<int>(std::max_element(values, values + n) - values);
 }
 
-MlpSpec networkSpec(const EnvSpec& env, const DqnSettings& settings) {
+}  // namespace
+
+MlpSpec dqnNetwork(const EnvSpec& env, const DqnSettings& settings) {
   if (env.num_actions < 1) {
     throw Error("environment '" + env.name + "' has continuous actions: DQN needs discrete ones.");
   }
@@ -24,8 +26,6 @@ MlpSpec networkSpec(const EnvSpec& env, const DqnSettings& settings) {
   spec.dueling = settings.dueling;
   return spec;
 }
-
-}  // namespace
 
 void bind(Settings& s, const std::string& prefix, DqnSettings& d) {
   const Range positive = Range::between(1, 1e9);
@@ -73,7 +73,7 @@ DqnLearner::DqnLearner(std::vector<std::unique_ptr<Env>> envs, const DqnSettings
       num_actions_(envs_.front()->spec().num_actions),
       epsilon_{settings.epsilon_start, settings.epsilon_finish,
                settings.epsilon_fraction * static_cast<double>(total_updates)},
-      network_(networkSpec(envs_.front()->spec(), settings)),
+      network_(dqnNetwork(envs_.front()->spec(), settings)),
       workspace_(network_, std::max(static_cast<std::size_t>(settings.batch_size), envs_.size())),
       replay_(static_cast<std::size_t>(settings.buffer_size), observation_size_, 1,
               settings.priority_alpha, settings.priority_beta),

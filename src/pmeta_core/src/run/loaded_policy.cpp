@@ -31,17 +31,6 @@ int numberOf(const PolicyFile& file, const std::string& path, const std::string&
   return value;
 }
 
-// the network that DqnLearner trains
-MlpSpec networkSpec(const EnvSpec& env, const DqnSettings& settings) {
-  MlpSpec spec;
-  spec.prefix = "q";
-  spec.inputs = static_cast<std::size_t>(env.observation_size);
-  spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
-  spec.outputs = static_cast<std::size_t>(env.num_actions);
-  spec.dueling = settings.dueling;
-  return spec;
-}
-
 }  // namespace
 
 struct LoadedPolicy::Network {
@@ -85,7 +74,7 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file)
                {static_cast<std::size_t>(table_->numStates()),
                 static_cast<std::size_t>(table_->numActions())}}};
   } else if (experiment_.settings().learner == "dqn" && spec().num_actions > 0) {
-    mlp = std::make_unique<Mlp>(networkSpec(spec(), experiment_.settings().dqn));
+    mlp = std::make_unique<Mlp>(dqnNetwork(spec(), experiment_.settings().dqn));
     blocks = mlp->blocks();
   } else {
     throw Error("the policy file " + path + " is of learner '" + experiment_.settings().learner +

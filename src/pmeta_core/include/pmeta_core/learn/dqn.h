@@ -44,6 +44,9 @@ struct DqnSettings {
 /// Binds all of them below `prefix`, e.g. "dqn.".
 void bind(Settings& settings, const std::string& prefix, DqnSettings& dqn);
 
+/// The Q-network that DqnLearner trains. Throws Error if actions are continuous.
+MlpSpec dqnNetwork(const EnvSpec& env, const DqnSettings& settings);
+
 /// Deep Q-learning on one task with discrete actions: environments, replay and target networks.
 ///
 /// The parameters belong to the caller: it passes them in, and an optimiser that moves them.
