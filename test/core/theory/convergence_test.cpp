@@ -25,6 +25,7 @@ ConvergenceSettings smallSettings() {
   settings.fixed_point.lambdas = {0, 10};
   settings.fixed_point.sweeps = 2000;
   settings.meta.lambdas = {1, 5, 10, 20, 50};
+  settings.meta.draws = 3;
   return settings;
 }
 
@@ -129,10 +130,28 @@ TEST(Convergence, DistanceFallsAsOneOverLambdaSquared) {
     EXPECT_NEAR(row.gradient_bound / row.distance2, 2, 1e-9);
     if (row.lambda < 5) continue;
     EXPECT_LE(row.entry_ratio, 1);
-    if (row.diversity == "random") scaled.push_back(row.lambda * row.lambda * row.distance2);
+    if (row.diversity == "random") scaled.push_back(row.lambda * row.lambda * row.mean_distance2);
   }
   ASSERT_EQ(scaled.size(), 4u);
   for (const double one : scaled) EXPECT_NEAR(one / scaled[1], 1, 0.15);
+}
+
+TEST(Convergence, MeanDistanceIsOverTheDrawsOfTheFollowingSeeds) {
+  ConvergenceSettings settings = smallSettings();
+  settings.diversities = {"centre", "random"};
+  settings.contraction.pairs = 1;
+  settings.fixed_point.sweeps = 100;
+  settings.meta.lambdas = {10};
+  double sum = 0;
+  for (settings.seed = 0; settings.seed < 3; ++settings.seed) {
+    sum += measureConvergence(settings).distance.back().distance2;
+  }
+  settings.seed = 0;
+  const std::vector<DistanceRow> rows = measureConvergence(settings).distance;
+  EXPECT_NEAR(rows.back().mean_distance2, sum / 3, 1e-12 * sum);
+  EXPECT_NE(rows.back().mean_distance2, rows.back().distance2);
+  // nothing is drawn where the landmark is in the centre
+  EXPECT_EQ(rows.front().mean_distance2, rows.front().distance2);
 }
 
 TEST(Convergence, SigmaOfTwoGridsByHand) {

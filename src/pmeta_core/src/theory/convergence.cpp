@@ -16,6 +16,17 @@ std::vector<double> samplingSlip(const ConvergenceSettings& settings) {
   return {settings.fixed_point.slip};
 }
 
+// the further draws of a task set: those of the seeds after the settings' own
+std::vector<KnownTasks> furtherDraws(ConvergenceSettings settings, const std::string& diversity) {
+  std::vector<KnownTasks> draws;
+  if (diversity != "random" && diversity != "random_slip") return draws;
+  for (int d = 1; d < settings.meta.draws; ++d) {
+    ++settings.seed;
+    draws.push_back(makeKnownTasks(settings, diversity));
+  }
+  return draws;
+}
+
 }  // namespace
 
 ConvergenceReport measureConvergence(const ConvergenceSettings& settings,
@@ -59,9 +70,14 @@ ConvergenceReport measureConvergence(const ConvergenceSettings& settings,
   }
 
   for (const KnownTasks& set : sets) {
+    const std::vector<KnownTasks> draws = furtherDraws(settings, set.diversity.diversity);
     for (const double lambda : settings.meta.lambdas) {
       announce("Theorem 2, " + set.diversity.diversity, lambda);
-      report.distance.push_back(measureMeta(settings, set, lambda, report.gradient));
+      DistanceRow row = measureMeta(settings, set, lambda, report.gradient);
+      double sum = row.distance2;
+      for (const KnownTasks& draw : draws) sum += measureDistance(settings, draw, lambda);
+      row.mean_distance2 = sum / static_cast<double>(1 + draws.size());
+      report.distance.push_back(row);
     }
   }
   if (progress) progress("done", 1);

@@ -27,4 +27,7 @@ StepLimitRow measureStepLimit(const ConvergenceSettings& settings, const KnownTa
 DistanceRow measureMeta(const ConvergenceSettings& settings, const KnownTasks& set, double lambda,
                         std::vector<GradientRow>& rows);
 
+/// mean_i ||Q_i* - Q||^2 after the last round, with the step size of measureMeta.
+double measureDistance(const ConvergenceSettings& settings, const KnownTasks& set, double lambda);
+
 }  // namespace pmeta

@@ -99,6 +99,10 @@ class MetaIteration {
   ArrayXd entry_distance2_;
 };
 
+double usedEta(const ConvergenceSettings& settings, double lambda) {
+  return std::min(settings.meta.eta_cap, 1 / lambda);
+}
+
 // largest eta with eta_tilde L (3/2 + 12/(lambda^2-8) + 24 lambda^2/(lambda^2-8)) <= 1/4, where
 // L = lambda and eta_tilde = eta beta R
 double allowedEta(double lambda, int updates, double beta) {
@@ -176,7 +180,7 @@ DistanceRow measureMeta(const ConvergenceSettings& settings, const KnownTasks& s
   DistanceRow result;
   result.diversity = set.diversity.diversity;
   result.lambda = lambda;
-  result.eta = std::min(settings.meta.eta_cap, 1 / lambda);
+  result.eta = usedEta(settings, lambda);
   result.allowed_eta = allowedEta(lambda, settings.updates_per_round, settings.meta.beta);
   result.sigma2_squared = sigma2Squared(lambda, settings.gamma, set.diversity);
 
@@ -201,6 +205,14 @@ DistanceRow measureMeta(const ConvergenceSettings& settings, const KnownTasks& s
   followRounds(settings, kAllowedRounds, true, result, careful, rows);
   result.allowed_factor = careful.gradient().square().sum() / before;
   return result;
+}
+
+double measureDistance(const ConvergenceSettings& settings, const KnownTasks& set, double lambda) {
+  MetaIteration iteration(set.tasks, lambda);
+  for (int c = 1; c <= settings.rounds; ++c) {
+    iteration.runRound(settings.updates_per_round, usedEta(settings, lambda), settings.meta.beta);
+  }
+  return iteration.distance2();
 }
 
 }  // namespace pmeta

@@ -83,7 +83,8 @@ std::string gradientCsv(const ConvergenceReport& report) {
 std::string distanceCsv(const ConvergenceReport& report) {
   CsvText csv(
       "diversity,sigma,r_max,lambda,slope,shape_ratio,gradient_left,eta,allowed_eta,allowed_factor,"
-      "distance2,lambda2_distance2,gradient_bound,sigma2_squared,entry_distance2,entry_bound,"
+      "distance2,mean_distance2,lambda2_mean_distance2,gradient_bound,sigma2_squared,entry_"
+      "distance2,entry_bound,"
       "entry_ratio");
   for (const DistanceRow& row : report.distance) {
     const DiversityRow& set =
@@ -91,7 +92,8 @@ std::string distanceCsv(const ConvergenceReport& report) {
                       [&](const DiversityRow& one) { return one.diversity == row.diversity; });
     csv.add(set.diversity).add(set.sigma).add(set.r_max).add(row.lambda).add(row.slope);
     csv.add(row.shape_ratio).add(row.gradient_left).add(row.eta).add(row.allowed_eta);
-    csv.add(row.allowed_factor).add(row.distance2).add(row.lambda * row.lambda * row.distance2);
+    csv.add(row.allowed_factor).add(row.distance2).add(row.mean_distance2);
+    csv.add(row.lambda * row.lambda * row.mean_distance2);
     csv.add(row.gradient_bound).add(row.sigma2_squared).add(row.entry_distance2);
     csv.add(row.entry_bound).add(row.entry_ratio).endLine();
   }

@@ -46,6 +46,10 @@ void bindAll(Settings& s, ConvergenceSettings& c) {
   s.bind("meta.eta_cap", c.meta.eta_cap, "eta = min(eta_cap, 1 / lambda)", Range::above(0));
   s.bind("meta.beta", c.meta.beta, "mixing: meta <- (1 - beta) meta + beta mean",
          Range{0, 1, true, false});
+  s.bind("meta.draws", c.meta.draws,
+         "task sets, of seeds one after the other, that the distance's dependence on lambda is "
+         "averaged over where landmarks are random",
+         Range::between(1, 10000));
 
   s.bind("environment.name", c.environment, "family of environments", {"gridworld"});
   s.bind("environment.sizes", c.sizes, "cells along each side, one task each",

@@ -206,6 +206,13 @@ void addAllowedStep(const ConvergenceReport& report, std::vector<Statement>& all
   }
 }
 
+// ", 8 draws" where tasks are drawn: the number is their mean
+std::string drawsOf(const ConvergenceReport& report, const std::string& diversity) {
+  const int draws = report.settings.meta.draws;
+  if (diversity.rfind("random", 0) != 0 || draws == 1) return "";
+  return ", " + std::to_string(draws) + " draws";
+}
+
 // how nearly mean_i ||Q_i* - Q||^2 goes with 1 / lambda^2
 void addDistance(const ConvergenceReport& report, std::vector<Statement>& all) {
   std::vector<Statement> exponents;
@@ -214,8 +221,8 @@ void addDistance(const ConvergenceReport& report, std::vector<Statement>& all) {
     std::vector<double> scaled;
     for (const DistanceRow* row : rowsOf(report, set.diversity)) {
       if (row->lambda < kExponentFrom) continue;
-      line.add(std::log(row->lambda), std::log(row->distance2));
-      scaled.push_back(row->lambda * row->lambda * row->distance2);
+      line.add(std::log(row->lambda), std::log(row->mean_distance2));
+      scaled.push_back(row->lambda * row->lambda * row->mean_distance2);
     }
     // equal tasks agree in the end, whatever lambda
     if (line.count() < 2 || set.sigma == 0) continue;
@@ -225,10 +232,11 @@ void addDistance(const ConvergenceReport& report, std::vector<Statement>& all) {
     const auto range = std::minmax_element(scaled.begin(), scaled.end());
     all.push_back({"2b: l^2 mean |Q_i*-Q|^2 constant from l = 5", set.diversity, deviation,
                    kNearConstant, yesNo(deviation <= kNearConstant),
-                   rounded(*range.first, 4) + ".." + rounded(*range.second, 4)});
+                   rounded(*range.first, 4) + ".." + rounded(*range.second, 4) +
+                       drawsOf(report, set.diversity)});
     exponents.push_back({"2b: exponent of mean |Q_i*-Q|^2 in l", set.diversity, line.slope(), -2,
                          yesNo(std::abs(line.slope() + 2) <= kNearExponent),
-                         rounded(line.slope() + 2) + " off"});
+                         rounded(line.slope() + 2) + " off" + drawsOf(report, set.diversity)});
   }
   all.insert(all.end(), exponents.begin(), exponents.end());
 }

@@ -37,6 +37,7 @@ struct ConvergenceSettings {
     std::vector<double> lambdas = {1, 5, 10, 20, 50};
     double eta_cap = 0.1;  ///< eta = min(eta_cap, 1 / lambda)
     double beta = 1;
+    int draws = 8;  ///< task sets that the mean distance is over, where landmarks are random
   } meta;
 
   std::string environment = "gridworld";
@@ -127,6 +128,7 @@ struct DistanceRow {
   double allowed_eta = 0;      ///< the largest that satisfies the theorem's step condition
   double allowed_factor = 0;   ///< ||grad L||^2 after 10 rounds at allowed_eta over that before
   double distance2 = 0;        ///< mean_i ||Q_i* - Q||^2
+  double mean_distance2 = 0;   ///< the same, mean over the draws of the task set
   double gradient_bound = 0;   ///< 2 / lambda^2 mean_i ||grad L_i||^2
   double sigma2_squared = 0;   ///< sigma_2^2 of the theorem
   double entry_distance2 = 0;  ///< largest mean_i |Q_i* - Q|^2 of one (s,a)
