@@ -124,6 +124,7 @@ pmeta_msgs::TaskReturn toMsg(const pmeta::TaskReturn& result, const std::string&
                                                    : pmeta_msgs::TaskReturn::TEST;
   msg.policy_name = pmeta::name(result.policy);
   msg.split_name = pmeta::name(result.split);
+  msg.context_episodes = static_cast<std::uint32_t>(result.context_episodes);
   msg.return_mean = result.mean;
   msg.return_std = result.std;
   msg.episodes = static_cast<std::uint32_t>(result.episodes);
@@ -149,6 +150,7 @@ pmeta::TaskReturn fromMsg(const pmeta_msgs::TaskReturn& msg) {
                                                                  : pmeta::Policy::kMeta;
   result.split =
       msg.split == pmeta_msgs::TaskReturn::TRAIN ? pmeta::Split::kTrain : pmeta::Split::kTest;
+  result.context_episodes = toInt(msg.context_episodes, "number of context episodes");
   result.mean = msg.return_mean;
   result.std = msg.return_std;
   result.episodes = toInt(msg.episodes, "number of episodes");
@@ -192,6 +194,7 @@ pmeta_msgs::RoundSummary toMsg(const pmeta::RoundSummary& summary,
   msg.rounds = static_cast<std::uint32_t>(summary.rounds);
   msg.personal_return = summary.personal_return;
   msg.meta_return = summary.meta_return;
+  msg.test_return = summary.test_return;
   msg.participants = toUnsigned(summary.participants);
   msg.missing = toUnsigned(summary.missing);
   msg.round_s = summary.seconds;

@@ -36,13 +36,13 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
       aggregator_(experiment),
       book_(experiment),
       log_(experiment),
-      mailbox_(8 * static_cast<std::size_t>(experiment.numTasks()) + 16) {
+      mailbox_(8 * static_cast<std::size_t>(experiment.totalTasks()) + 16) {
   summary_.run_id = experiment.settings().run_id;
   summary_.experiment = experiment.settings().experiment;
   summary_.rounds = static_cast<std::uint32_t>(experiment.settings().rounds);
-  summary_.personal_return = summary_.meta_return = std::nan("");
+  summary_.personal_return = summary_.meta_return = summary_.test_return = std::nan("");
 
-  const auto queue = static_cast<std::uint32_t>(4 * experiment.numTasks() + 8);
+  const auto queue = static_cast<std::uint32_t>(8 * experiment.totalTasks() + 8);
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
   meta_pub_ = nh_.advertise<pmeta_msgs::MetaPolicy>("meta_policy", 1, true);
   round_pub_ = nh_.advertise<RoundSummary>("round", 8, true);
@@ -101,8 +101,11 @@ void MetaAggregatorNode::work() {
 
 void MetaAggregatorNode::runRounds() {
   const int rounds = experiment_.settings().rounds;
-  ROS_INFO("run %s: %d tasks, %d rounds; results in %s", summary_.run_id.c_str(),
-           experiment_.numTasks(), rounds, log_.dir().c_str());
+  const int tests = experiment_.numTestTasks();
+  ROS_INFO("run %s: %d tasks%s, %d rounds; results in %s", summary_.run_id.c_str(),
+           experiment_.numTasks(),
+           tests == 0 ? "" : (" and " + std::to_string(tests) + " test tasks").c_str(), rounds,
+           log_.dir().c_str());
   publishRound(RoundSummary::RUNNING, "waiting for the agents' first updates");
   publishMetaPolicy();
   while (!stop_ && book_.roundsTaken() < rounds) {
@@ -196,9 +199,11 @@ void MetaAggregatorNode::writeCompleteRounds(bool force) {
     summary_.refused = refused;
     publishRound(RoundSummary::RUNNING,
                  "round " + std::to_string(round.summary.round) + " is complete");
-    ROS_INFO("round %d/%d  PP %s  MP %s  %.2f s  ETA %.0f s", round.summary.round,
+    const std::string test =
+        experiment_.numTestTasks() == 0 ? "" : "  test " + shortNumber(round.summary.test_return);
+    ROS_INFO("round %d/%d  PP %s  MP %s%s  %.2f s  ETA %.0f s", round.summary.round,
              round.summary.rounds, shortNumber(round.summary.personal_return).c_str(),
-             shortNumber(round.summary.meta_return).c_str(), round.summary.seconds,
+             shortNumber(round.summary.meta_return).c_str(), test.c_str(), round.summary.seconds,
              round.summary.eta_seconds);
   }
 }

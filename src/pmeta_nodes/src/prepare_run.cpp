@@ -25,7 +25,7 @@ constexpr char kHelp[] =
   rosrun pmeta_nodes prepare_run CONFIG AGENTS_LAUNCH [--record] [key:=value ...]
 
 CONFIG         settings file
-AGENTS_LAUNCH  launch file to write: a task_agent for each task and, with --record, rosbag
+AGENTS_LAUNCH  launch file to write: a task_agent for each training and test task and, with --record, rosbag
 key:=value     settings that override the file's; an empty value leaves the file's. The value of
                `settings` is itself a list of assignments: "settings:=slip=0.1 beta=0.5".
 Called by the launch files; exits with 1 and one sentence if the settings are bad.
@@ -89,7 +89,7 @@ std::string escapeXml(const std::string& text) {
 std::string agentsLaunch(const Experiment& experiment, bool record) {
   std::ostringstream xml;
   xml << "<launch>\n";
-  for (int task = 0; task < experiment.numTasks(); ++task) {
+  for (int task = 0; task < experiment.totalTasks(); ++task) {
     xml << "  <node name=\"task_agent_" << task
         << "\" pkg=\"pmeta_nodes\" type=\"task_agent\" respawn=\"true\" respawn_delay=\"1\">\n"
         << "    <param name=\"task\" value=\"" << task << "\"/>\n"

@@ -10,7 +10,8 @@ constexpr char kHelp[] =
   rosrun pmeta_nodes task_agent _task:=0 __ns:=/pmeta
 
 private parameters
-  ~task         index of the task, from 0 (required)
+  ~task         index of the task, from 0 (required); test tasks come after the training tasks,
+                and only evaluate the meta-policy
   ~config_file  settings file; by default the parameter `config` of the namespace is read
 subscribes   meta_policy, round
 publishes    auxiliary, returns, agent_status, task_<i>/trajectory, /diagnostics
@@ -22,9 +23,9 @@ int runAgent(const pmeta::Experiment& experiment) {
   if (!ros::NodeHandle("~").getParam("task", task)) {
     throw pmeta::Error("which task? Give the private parameter task, e.g. _task:=0.");
   }
-  if (task < 0 || task >= experiment.numTasks()) {
+  if (task < 0 || task >= experiment.totalTasks()) {
     throw pmeta::Error("task is " + std::to_string(task) + " but must be from 0 to " +
-                       std::to_string(experiment.numTasks() - 1) + ".");
+                       std::to_string(experiment.totalTasks() - 1) + ".");
   }
   return pmeta_nodes::TaskAgentNode(experiment, task).spin();
 }

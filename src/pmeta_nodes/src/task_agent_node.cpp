@@ -153,11 +153,17 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
   if (meta.round > 0 && experiment_.evaluatesMeta()) {
     setState(AgentStatus::EVALUATING,
              "evaluating the meta-policy of round " + std::to_string(meta.round));
-    deliver(agent_.evaluateMeta(meta));
+    for (const pmeta::TaskReturn& result : agent_.evaluateMeta(meta)) deliver(result);
     if (trajectory_pub_) publishEpisode(agent_.recordMeta(meta), meta.round, pmeta::Policy::kMeta);
   }
   if (meta.round >= rounds) {
     setState(AgentStatus::DONE, "all " + std::to_string(rounds) + " rounds are done");
+    return;
+  }
+
+  if (!agent_.trains()) {
+    setState(AgentStatus::WAITING,
+             "test task: waiting for the meta-policy of round " + std::to_string(meta.round + 1));
     return;
   }
 

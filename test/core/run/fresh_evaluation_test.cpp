@@ -76,18 +76,20 @@ TEST(FreshEvaluation, FreshEpisodesAreNotThoseOfTheRounds) {
   const MetaAggregator aggregator(experiment);
   const Model& policy = aggregator.metaPolicy().model;
   // ten starts against a hundred others: equal means would be a coincidence
-  EXPECT_NE(agent.evaluateFresh(policy, 100).mean,
-            agent.evaluateMeta(aggregator.metaPolicy()).mean);
-  EXPECT_EQ(agent.evaluateFresh(policy, 100).episodes, 100);
-  EXPECT_EQ(agent.evaluateFresh(policy, 100).mean, agent.evaluateFresh(policy, 100).mean);
+  EXPECT_NE(agent.evaluateFresh(Policy::kPersonal, policy, 100).mean,
+            agent.evaluateMeta(aggregator.metaPolicy()).front().mean);
+  EXPECT_EQ(agent.evaluateFresh(Policy::kPersonal, policy, 100).episodes, 100);
+  EXPECT_EQ(agent.evaluateFresh(Policy::kPersonal, policy, 100).mean,
+            agent.evaluateFresh(Policy::kPersonal, policy, 100).mean);
 }
 
 TEST(FreshEvaluation, WritesOneLineForEachRow) {
-  EXPECT_EQ(FreshEvaluation::csv({{"best", 3, Policy::kPersonal, 1, 0, {-1.5, 0.25, 100}},
-                                  {"last", 4, Policy::kMeta, -1, 2, {200, 0, 100}}}),
-            "snapshot,round,policy,trained_task,task,return_mean,return_std,episodes\n"
-            "best,3,personal,1,0,-1.5,0.25,100\n"
-            "last,4,meta,-1,2,200,0,100\n");
+  EXPECT_EQ(
+      FreshEvaluation::csv({{"best", 3, Policy::kPersonal, 1, 0, Split::kTrain, {-1.5, 0.25, 100}},
+                            {"last", 4, Policy::kMeta, -1, 2, Split::kTest, {200, 0, 100}}}),
+      "snapshot,round,policy,trained_task,task,split,return_mean,return_std,episodes\n"
+      "best,3,personal,1,0,train,-1.5,0.25,100\n"
+      "last,4,meta,-1,2,test,200,0,100\n");
 }
 
 }  // namespace

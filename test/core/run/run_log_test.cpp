@@ -67,18 +67,18 @@ TEST(RoundBook, GivesRowsByPolicyThenTaskWithCountersSummedOverRounds) {
   const auto rounds = book.take();
   ASSERT_EQ(rounds.size(), 2u);
   EXPECT_EQ(csvOf(rounds),
-            "1,0,train,personal,-100,0.1,3,1000,3,0.000000\n"
-            "1,1,train,personal,-110,0.1,3,1001,3,0.000000\n"
-            "1,2,train,personal,-120,0.1,3,1002,3,0.000000\n"
-            "1,0,train,meta,-101,0.1,3,1000,3,0.000000\n"
-            "1,1,train,meta,-111,0.1,3,1001,3,0.000000\n"
-            "1,2,train,meta,-121,0.1,3,1002,3,0.000000\n"
-            "2,0,train,personal,-200,0.1,3,3000,6,0.000000\n"
-            "2,1,train,personal,-210,0.1,3,3002,6,0.000000\n"
-            "2,2,train,personal,-220,0.1,3,3004,6,0.000000\n"
-            "2,0,train,meta,-201,0.1,3,3000,6,0.000000\n"
-            "2,1,train,meta,-211,0.1,3,3002,6,0.000000\n"
-            "2,2,train,meta,-221,0.1,3,3004,6,0.000000\n");
+            "1,0,train,personal,0,-100,0.1,3,1000,3,0.000000\n"
+            "1,1,train,personal,0,-110,0.1,3,1001,3,0.000000\n"
+            "1,2,train,personal,0,-120,0.1,3,1002,3,0.000000\n"
+            "1,0,train,meta,0,-101,0.1,3,1000,3,0.000000\n"
+            "1,1,train,meta,0,-111,0.1,3,1001,3,0.000000\n"
+            "1,2,train,meta,0,-121,0.1,3,1002,3,0.000000\n"
+            "2,0,train,personal,0,-200,0.1,3,3000,6,0.000000\n"
+            "2,1,train,personal,0,-210,0.1,3,3002,6,0.000000\n"
+            "2,2,train,personal,0,-220,0.1,3,3004,6,0.000000\n"
+            "2,0,train,meta,0,-201,0.1,3,3000,6,0.000000\n"
+            "2,1,train,meta,0,-211,0.1,3,3002,6,0.000000\n"
+            "2,2,train,meta,0,-221,0.1,3,3004,6,0.000000\n");
 
   const RoundSummary& summary = rounds[1].summary;
   EXPECT_EQ(summary.run_id, "run");
@@ -221,14 +221,14 @@ TEST(RoundBook, ForcedRoundsComeOutAsTheyAre) {
   book.add(makeReturn(2, 0, Policy::kPersonal));
   const auto rounds = book.take(true);
   ASSERT_EQ(rounds.size(), 1u) << "round 2 is not closed";
-  EXPECT_EQ(csvOf(rounds), "1,2,train,personal,-120,0.1,3,1002,3,0.000000\n");
+  EXPECT_EQ(csvOf(rounds), "1,2,train,personal,0,-120,0.1,3,1002,3,0.000000\n");
   EXPECT_EQ(rounds[0].summary.personal_return, -120);
   EXPECT_TRUE(std::isnan(rounds[0].summary.meta_return));
   EXPECT_FALSE(book.add(makeReturn(1, 0, Policy::kPersonal))) << "too late";
 
   book.closeRound(2, {0}, {1, 2}, 1);
   const auto second = book.take(true);
-  EXPECT_EQ(csvOf(second), "2,0,train,personal,-200,0.1,3,2000,3,0.000000\n");
+  EXPECT_EQ(csvOf(second), "2,0,train,personal,0,-200,0.1,3,2000,3,0.000000\n");
 }
 
 TEST(RoundBook, IndependentRunsHaveNoMetaReturns) {
@@ -262,9 +262,11 @@ TEST(RunLog, WritesOneLineAReturn) {
   row.env_steps = 12345678901;
   row.updates = 9;
   EXPECT_EQ(RunLog::csvLine(row),
-            "3,1,test,meta,-0.3333333333333333,1e-300,3,12345678901,9,0.123456");
-  EXPECT_STREQ(RunLog::csvHeader(),
-               "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s");
+            "3,1,test,meta,0,-0.3333333333333333,1e-300,3,12345678901,9,0.123456");
+  EXPECT_STREQ(
+      RunLog::csvHeader(),
+      "round,task,split,policy,context_episodes,return_mean,return_std,episodes,env_steps,updates,"
+      "wall_s");
 }
 
 // what a folder holds, by name

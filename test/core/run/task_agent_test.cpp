@@ -131,7 +131,9 @@ TEST(TaskAgent, EvaluatesTheMetaPolicyOnItsTask) {
   const Experiment experiment = gridExperiment();
   const TaskAgent agent(experiment, 2);
   const MetaPolicy meta = laterMeta(experiment, 3);
-  const TaskReturn result = agent.evaluateMeta(meta);
+  const std::vector<TaskReturn> results = agent.evaluateMeta(meta);
+  ASSERT_EQ(results.size(), 1u);
+  const TaskReturn& result = results.front();
   EXPECT_EQ(result.policy, Policy::kMeta);
   EXPECT_EQ(result.round, 3);
   EXPECT_EQ(result.task, 2);

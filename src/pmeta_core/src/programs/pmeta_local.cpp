@@ -142,11 +142,13 @@ int run(Arguments arguments) {
   std::cout << "settings\n" << experiment.table() << std::flush;
   printNotes(experiment);
   const pmeta::LocalResult result =
-      pmeta::runLocally(experiment, &log, [](const pmeta::RoundSummary& summary) {
-        std::printf("round %d/%d  PP %s  MP %s  %s  ETA %s\n", summary.round, summary.rounds,
+      pmeta::runLocally(experiment, &log, [&](const pmeta::RoundSummary& summary) {
+        const std::string test =
+            experiment.numTestTasks() == 0 ? "" : "  test " + shortNumber(summary.test_return);
+        std::printf("round %d/%d  PP %s  MP %s%s  %s  ETA %s\n", summary.round, summary.rounds,
                     shortNumber(summary.personal_return).c_str(),
-                    shortNumber(summary.meta_return).c_str(), duration(summary.seconds).c_str(),
-                    duration(summary.eta_seconds).c_str());
+                    shortNumber(summary.meta_return).c_str(), test.c_str(),
+                    duration(summary.seconds).c_str(), duration(summary.eta_seconds).c_str());
         std::fflush(stdout);
         return !g_stop;
       });
@@ -236,16 +238,17 @@ int evaluate(const Arguments& arguments) {
   }
   const pmeta::LoadedPolicy policy(arguments.words[0]);
   const Experiment& experiment = policy.experiment();
-  if (arguments.task >= experiment.numTasks()) {
+  if (arguments.task >= experiment.totalTasks()) {
     throw Error("--task is " + std::to_string(arguments.task) + " but must be from 0 to " +
-                std::to_string(experiment.numTasks() - 1) + ".");
+                std::to_string(experiment.totalTasks() - 1) + ".");
   }
   std::cout << policy.description() << "\n";
   const int only = arguments.task < 0 ? policy.task() : arguments.task;
-  for (int task = 0; task < experiment.numTasks() && !g_stop; ++task) {
+  for (int task = 0; task < experiment.totalTasks() && !g_stop; ++task) {
     if (only >= 0 && task != only) continue;
     const pmeta::ReturnStats stats =
-        pmeta::TaskAgent(experiment, task).evaluateFresh(policy.model(), arguments.episodes);
+        pmeta::TaskAgent(experiment, task)
+            .evaluateFresh(policy.policy(), policy.model(), arguments.episodes);
     std::printf("task %d %s  return %s +- %s over %d episodes\n", task,
                 experiment.family().taskName(task).c_str(), shortNumber(stats.mean).c_str(),
                 shortNumber(stats.std).c_str(), stats.episodes);

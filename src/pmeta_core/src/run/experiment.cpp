@@ -233,6 +233,10 @@ void Experiment::checkStability() {
   }
 }
 
+int Experiment::numTestTasks() const { return evaluatesMeta() ? family_->numTestTasks() : 0; }
+
+std::vector<int> Experiment::contextEpisodes() const { return {0}; }
+
 int Experiment::quorum() const {
   return settings_.aggregation.quorum == 0 ? numTasks() : settings_.aggregation.quorum;
 }

@@ -7,7 +7,9 @@ namespace pmeta {
 void FreshEvaluation::offer(const RoundSummary& summary, const std::vector<TaskAgent>& agents,
                             const MetaPolicy& meta) {
   std::vector<Model> personal;
-  for (const TaskAgent& agent : agents) personal.push_back(agent.personal());
+  for (const TaskAgent& agent : agents) {
+    if (agent.trains()) personal.push_back(agent.personal());
+  }
   last_personal_ = {summary.round, summary.personal_return, std::move(personal)};
   last_meta_ = {summary.round, summary.meta_return, {meta.model}};
   // a missing return is not a number, and never better
@@ -18,20 +20,23 @@ void FreshEvaluation::offer(const RoundSummary& summary, const std::vector<TaskA
 std::vector<FreshReturn> FreshEvaluation::evaluate(const std::vector<TaskAgent>& agents,
                                                    int episodes, bool cross) const {
   std::vector<FreshReturn> rows;
-  const int n = static_cast<int>(agents.size());
+  const int n = static_cast<int>(last_personal_.models.size());
   const auto personal = [&](const char* snapshot, const Kept& kept) {
     for (int trained = 0; trained < static_cast<int>(kept.models.size()); ++trained) {
       for (int task = 0; task < n; ++task) {
         if (task != trained && !cross) continue;
-        rows.push_back({snapshot, kept.round, Policy::kPersonal, trained, task,
-                        agents[task].evaluateFresh(kept.models[trained], episodes)});
+        rows.push_back(
+            {snapshot, kept.round, Policy::kPersonal, trained, task, Split::kTrain,
+             agents[task].evaluateFresh(Policy::kPersonal, kept.models[trained], episodes)});
       }
     }
   };
   const auto meta = [&](const char* snapshot, const Kept& kept) {
-    for (int task = 0; task < n && !kept.models.empty(); ++task) {
+    const int all = static_cast<int>(agents.size());
+    for (int task = 0; task < all && !kept.models.empty(); ++task) {
       rows.push_back({snapshot, kept.round, Policy::kMeta, -1, task,
-                      agents[task].evaluateFresh(kept.models[0], episodes)});
+                      agents[task].trains() ? Split::kTrain : Split::kTest,
+                      agents[task].evaluateFresh(Policy::kMeta, kept.models[0], episodes)});
     }
   };
   personal("last", last_personal_);
@@ -45,12 +50,13 @@ std::vector<FreshReturn> FreshEvaluation::evaluate(const std::vector<TaskAgent>&
 }
 
 std::string FreshEvaluation::csv(const std::vector<FreshReturn>& rows) {
-  std::string text = "snapshot,round,policy,trained_task,task,return_mean,return_std,episodes\n";
+  std::string text =
+      "snapshot,round,policy,trained_task,task,split,return_mean,return_std,episodes\n";
   for (const FreshReturn& row : rows) {
     text += row.snapshot + "," + std::to_string(row.round) + "," + name(row.policy) + "," +
             std::to_string(row.trained_task) + "," + std::to_string(row.task) + "," +
-            formatNumber(row.stats.mean) + "," + formatNumber(row.stats.std) + "," +
-            std::to_string(row.stats.episodes) + "\n";
+            name(row.split) + "," + formatNumber(row.stats.mean) + "," +
+            formatNumber(row.stats.std) + "," + std::to_string(row.stats.episodes) + "\n";
   }
   return text;
 }

@@ -12,6 +12,7 @@ void savePolicies(const Experiment& experiment, const MetaPolicy& meta,
                   const std::vector<TaskAgent>& agents) {
   saveRunPolicy(experiment, Policy::kMeta, -1, meta.round, meta.model);
   for (const TaskAgent& agent : agents) {
+    if (!agent.trains()) continue;
     saveRunPolicy(experiment, Policy::kPersonal, agent.task(), meta.round, agent.personal());
   }
 }
@@ -22,7 +23,7 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
   MetaAggregator aggregator(experiment);
   RoundBook book(experiment);
   std::vector<TaskAgent> agents;
-  for (int task = 0; task < experiment.numTasks(); ++task) agents.emplace_back(experiment, task);
+  for (int task = 0; task < experiment.totalTasks(); ++task) agents.emplace_back(experiment, task);
 
   const int fresh_episodes = experiment.settings().fresh_episodes;
   FreshEvaluation fresh;
@@ -30,6 +31,7 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
   for (int round = 1; round <= experiment.settings().rounds && !result.stopped; ++round) {
     const auto start = std::chrono::steady_clock::now();
     for (TaskAgent& agent : agents) {
+      if (!agent.trains()) continue;
       auto trained = agent.trainRound(aggregator.metaPolicy());
       book.add(trained->personal);
       const MetaAggregator::Answer answer =
@@ -40,7 +42,8 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     book.closeRound(round, aggregator.metaPolicy().participants, missing, seconds.count());
     for (const TaskAgent& agent : agents) {
-      if (experiment.evaluatesMeta()) book.add(agent.evaluateMeta(aggregator.metaPolicy()));
+      if (!experiment.evaluatesMeta()) break;
+      for (const TaskReturn& result : agent.evaluateMeta(aggregator.metaPolicy())) book.add(result);
     }
     for (RoundBook::Round& done : book.take()) {
       if (fresh_episodes > 0) fresh.offer(done.summary, agents, aggregator.metaPolicy());

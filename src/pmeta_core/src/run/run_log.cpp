@@ -14,12 +14,13 @@
 namespace pmeta {
 namespace {
 
-double meanReturn(const std::vector<RoundRow>& rows, Policy policy) {
+double meanReturn(const std::vector<RoundRow>& rows, Policy policy, Split split, int context) {
   double sum = 0;
   int n = 0;
   for (const RoundRow& row : rows) {
-    if (row.result.policy != policy || row.result.split != Split::kTrain) continue;
-    sum += row.result.mean;
+    const TaskReturn& r = row.result;
+    if (r.policy != policy || r.split != split || r.context_episodes != context) continue;
+    sum += r.mean;
     ++n;
   }
   return n == 0 ? std::numeric_limits<double>::quiet_NaN() : sum / n;
@@ -29,18 +30,30 @@ double meanReturn(const std::vector<RoundRow>& rows, Policy policy) {
 
 RoundBook::RoundBook(const Experiment& experiment)
     : num_tasks_(experiment.numTasks()),
+      total_tasks_(experiment.totalTasks()),
+      contexts_(experiment.contextEpisodes()),
       rounds_(experiment.settings().rounds),
       expects_meta_(experiment.evaluatesMeta()),
       run_id_(experiment.settings().run_id),
-      env_steps_(experiment.numTasks(), 0),
-      updates_(experiment.numTasks(), 0) {}
+      env_steps_(experiment.totalTasks(), 0),
+      updates_(experiment.totalTasks(), 0) {}
 
 bool RoundBook::add(const TaskReturn& result) {
-  if (result.run_id != run_id_ || result.task < 0 || result.task >= num_tasks_ ||
+  if (result.run_id != run_id_ || result.task < 0 || result.task >= total_tasks_ ||
       result.round < next_ || result.round > rounds_) {
     return false;
   }
-  const auto key = std::make_pair(static_cast<int>(result.policy), result.task);
+  // what no agent of this run evaluates
+  const bool tests = result.task >= num_tasks_;
+  const bool personal = result.policy == Policy::kPersonal;
+  const bool known_context =
+      personal ? result.context_episodes == 0
+               : std::count(contexts_.begin(), contexts_.end(), result.context_episodes) > 0;
+  if (tests != (result.split == Split::kTest) || (tests && personal) || !known_context) {
+    return false;
+  }
+  const auto key =
+      std::make_tuple(static_cast<int>(result.policy), result.task, result.context_episodes);
   return open_[result.round].results.emplace(key, result).second;
 }
 
@@ -56,16 +69,23 @@ void RoundBook::closeRound(int round, const std::vector<int>& participants,
   open.summary.seconds = seconds;
 }
 
+bool RoundBook::Open::hasPersonal(int task) const {
+  return results.count({static_cast<int>(Policy::kPersonal), task, 0}) != 0;
+}
+
+bool RoundBook::Open::hasMeta(int task, const std::vector<int>& contexts) const {
+  return std::all_of(contexts.begin(), contexts.end(), [&](int context) {
+    return results.count({static_cast<int>(Policy::kMeta), task, context}) != 0;
+  });
+}
+
 bool RoundBook::isComplete(const Open& open) const {
   if (!open.closed) return false;
-  const auto has = [&](Policy policy, int task) {
-    return open.results.count({static_cast<int>(policy), task}) != 0;
-  };
   for (const int task : open.summary.participants) {
-    if (!has(Policy::kPersonal, task)) return false;
+    if (!open.hasPersonal(task)) return false;
   }
-  for (int task = 0; expects_meta_ && task < num_tasks_; ++task) {
-    if (!has(Policy::kMeta, task)) return false;
+  for (int task = 0; expects_meta_ && task < total_tasks_; ++task) {
+    if (!open.hasMeta(task, contexts_)) return false;
   }
   return true;
 }
@@ -77,7 +97,7 @@ std::vector<RoundBook::Round> RoundBook::take(bool force) {
     if (!isComplete(open) && !(force && open.closed)) break;
     Round round;
     round.summary = open.summary;
-    // the map's order is the file's order: policy, then task
+    // the map's order is the file's order: policy, then task, then context
     for (auto& entry : open.results) {
       RoundRow row;
       row.result = entry.second;
@@ -86,8 +106,10 @@ std::vector<RoundBook::Round> RoundBook::take(bool force) {
       round.rows.push_back(std::move(row));
     }
     seconds_ += round.summary.seconds;
-    round.summary.personal_return = meanReturn(round.rows, Policy::kPersonal);
-    round.summary.meta_return = meanReturn(round.rows, Policy::kMeta);
+    round.summary.personal_return = meanReturn(round.rows, Policy::kPersonal, Split::kTrain, 0);
+    const int context = contexts_.back();
+    round.summary.meta_return = meanReturn(round.rows, Policy::kMeta, Split::kTrain, context);
+    round.summary.test_return = meanReturn(round.rows, Policy::kMeta, Split::kTest, context);
     round.summary.eta_seconds = seconds_ / next_ * (rounds_ - next_);
     taken.push_back(std::move(round));
     open_.erase(it);
@@ -100,7 +122,7 @@ bool RoundBook::hasPersonal(int round) const {
   const auto it = open_.find(round);
   if (it == open_.end()) return false;
   for (int task = 0; task < num_tasks_; ++task) {
-    if (it->second.results.count({static_cast<int>(Policy::kPersonal), task}) == 0) return false;
+    if (!it->second.hasPersonal(task)) return false;
   }
   return true;
 }
@@ -111,15 +133,15 @@ std::vector<int> RoundBook::awaited() const {
   const auto it = open_.find(next_);
   // a closed round does without the personal returns of those it missed
   const auto owesPersonal = [&](int task) {
+    if (task >= num_tasks_) return false;
     if (it == open_.end() || !it->second.closed) return true;
     const std::vector<int>& all = it->second.summary.participants;
     return std::find(all.begin(), all.end(), task) != all.end();
   };
-  for (int task = 0; task < num_tasks_; ++task) {
-    const auto has = [&](Policy policy) {
-      return it != open_.end() && it->second.results.count({static_cast<int>(policy), task}) != 0;
-    };
-    if ((owesPersonal(task) && !has(Policy::kPersonal)) || (expects_meta_ && !has(Policy::kMeta))) {
+  for (int task = 0; task < total_tasks_; ++task) {
+    const bool none = it == open_.end();
+    if ((owesPersonal(task) && (none || !it->second.hasPersonal(task))) ||
+        (expects_meta_ && (none || !it->second.hasMeta(task, contexts_)))) {
       tasks.push_back(task);
     }
   }
@@ -152,7 +174,9 @@ void RunLog::write(const RoundBook::Round& round) {
 void RunLog::finish(const std::string& status) { writeManifest(status); }
 
 const char* RunLog::csvHeader() {
-  return "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s";
+  return "round,task,split,policy,context_episodes,return_mean,return_std,episodes,env_steps,"
+         "updates,"
+         "wall_s";
 }
 
 std::string RunLog::csvLine(const RoundRow& row) {
@@ -160,9 +184,9 @@ std::string RunLog::csvLine(const RoundRow& row) {
   char seconds[32];
   std::snprintf(seconds, sizeof seconds, "%.6f", r.seconds);
   return std::to_string(r.round) + "," + std::to_string(r.task) + "," + name(r.split) + "," +
-         name(r.policy) + "," + formatNumber(r.mean) + "," + formatNumber(r.std) + "," +
-         std::to_string(r.episodes) + "," + std::to_string(row.env_steps) + "," +
-         std::to_string(row.updates) + "," + seconds;
+         name(r.policy) + "," + std::to_string(r.context_episodes) + "," + formatNumber(r.mean) +
+         "," + formatNumber(r.std) + "," + std::to_string(r.episodes) + "," +
+         std::to_string(row.env_steps) + "," + std::to_string(row.updates) + "," + seconds;
 }
 
 void RunLog::writeManifest(const std::string& status) {
@@ -181,9 +205,10 @@ void RunLog::writeManifest(const std::string& status) {
   manifest["commit"] = commit();
   manifest["versions"] = versions();
   manifest["tasks"] = nlohmann::ordered_json::array();
-  for (int task = 0; task < experiment_.numTasks(); ++task) {
+  for (int task = 0; task < experiment_.totalTasks(); ++task) {
+    const Split split = experiment_.isTestTask(task) ? Split::kTest : Split::kTrain;
     nlohmann::ordered_json entry = {{"task", task},
-                                    {"split", "train"},
+                                    {"split", name(split)},
                                     {"name", experiment_.family().taskName(task)},
                                     {"description", experiment_.family().taskDescription(task)}};
     if (const auto optimum = experiment_.optimalReturn(task)) entry["optimal_return"] = *optimum;

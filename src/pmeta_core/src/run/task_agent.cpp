@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "pmeta_core/base/error.h"
+
 namespace pmeta {
 namespace {
 
@@ -23,6 +25,7 @@ TaskAgent::TaskAgent(const Experiment& experiment, int task)
     : run_id_(experiment.settings().run_id),
       seed_(static_cast<std::uint64_t>(experiment.settings().seed)),
       task_(task),
+      split_(experiment.isTestTask(task) ? Split::kTest : Split::kTrain),
       updates_per_round_(experiment.settings().updates_per_round),
       keeps_personal_(experiment.keepsPersonal()),
       sends_personal_(experiment.sendsPersonal()),
@@ -30,6 +33,7 @@ TaskAgent::TaskAgent(const Experiment& experiment, int task)
 
 std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& meta,
                                                             const KeepGoing& keep_going) {
+  if (!trains()) throw Error("task " + std::to_string(task_) + " is a test task: not trained on.");
   checkModel(meta.model, learner_->layout(), "the aggregator");
   const Stopwatch watch;
   const int round = meta.round + 1;
@@ -48,8 +52,9 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   }
 
   result.distance = distance(learner_->personal(), meta.model);
-  result.personal = evaluate(learner_->personal());
-  result.personal.round = round;
+  Rng evaluation = evaluationRng();
+  result.personal =
+      makeReturn(round, Policy::kPersonal, learner_->evaluate(learner_->personal(), evaluation));
   result.personal.env_steps = env_steps;
   result.personal.updates = updates;
   result.personal.seconds = watch.seconds();
@@ -58,23 +63,28 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   return result;
 }
 
-TaskReturn TaskAgent::evaluateMeta(const MetaPolicy& meta) const {
+std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) const {
   checkModel(meta.model, learner_->layout(), "the aggregator");
   const Stopwatch watch;
-  TaskReturn result = evaluate(meta.model);
-  result.round = meta.round;
-  result.policy = Policy::kMeta;
-  result.seconds = watch.seconds();
-  return result;
+  Rng rng = evaluationRng();
+  std::vector<TaskReturn> results;
+  for (const AdaptedReturn& adapted : learner_->evaluateAdapted(meta.model, rng)) {
+    results.push_back(makeReturn(meta.round, Policy::kMeta, adapted.stats));
+    results.back().context_episodes = adapted.context_episodes;
+    results.back().seconds = watch.seconds();
+  }
+  return results;
 }
 
-ReturnStats TaskAgent::evaluateFresh(const Model& policy, int episodes) const {
+ReturnStats TaskAgent::evaluateFresh(Policy kind, const Model& policy, int episodes) const {
   ReturnStats total;
   double mean_of_squares = 0;
   for (std::uint64_t batch = 1; total.episodes < episodes; ++batch) {
     // rounds evaluate with round 0 of this stream
     Rng rng(seed_, task_, Stream::kEvaluate, batch);
-    const ReturnStats stats = learner_->evaluate(policy, rng);
+    const ReturnStats stats = kind == Policy::kPersonal
+                                  ? learner_->evaluate(policy, rng)
+                                  : learner_->evaluateAdapted(policy, rng).back().stats;
     const double share = static_cast<double>(stats.episodes) / (total.episodes + stats.episodes);
     total.mean += share * (stats.mean - total.mean);
     mean_of_squares += share * (stats.mean * stats.mean + stats.std * stats.std - mean_of_squares);
@@ -98,12 +108,13 @@ Episode TaskAgent::recordMeta(const MetaPolicy& meta) const {
 // the same draws for every policy and round: differences are the policies', not the dice's
 Rng TaskAgent::evaluationRng() const { return Rng(seed_, task_, Stream::kEvaluate); }
 
-TaskReturn TaskAgent::evaluate(const Model& policy) const {
-  Rng rng = evaluationRng();
-  const ReturnStats stats = learner_->evaluate(policy, rng);
+TaskReturn TaskAgent::makeReturn(int round, Policy policy, const ReturnStats& stats) const {
   TaskReturn result;
   result.run_id = run_id_;
   result.task = task_;
+  result.round = round;
+  result.split = split_;
+  result.policy = policy;
   result.mean = stats.mean;
   result.std = stats.std;
   result.episodes = stats.episodes;

@@ -64,6 +64,10 @@ class EnvFamily {
 
   virtual int numTasks() const = 0;
 
+  /// Tasks that nobody trains on. Tasks 0..numTasks()-1 are for training, the numTestTasks() after
+  /// them for tests; taskName(), taskDescription() and make() take both.
+  virtual int numTestTasks() const { return 0; }
+
   /// A short name without blanks or commas, e.g. "grid_4x4".
   virtual std::string taskName(int task) const = 0;
 

@@ -30,6 +30,12 @@ struct UpdateStats {
   double loss = 0;             ///< the learner's own measure; for tables the mean |TD error|
 };
 
+/// Return of a policy that was given some exploration episodes to find out about the task.
+struct AdaptedReturn {
+  int context_episodes = 0;  ///< how many; 0: before any
+  ReturnStats stats;
+};
+
 /// A learner bound to one task with its personal parameters phi and auxiliary parameters omega.
 class PersonalLearner {
  public:
@@ -52,6 +58,13 @@ class PersonalLearner {
 
   /// Return of `policy` on this task, greedy, by the protocol of the environment.
   virtual ReturnStats evaluate(const Model& policy, Rng& rng) const = 0;
+
+  /// Returns of a meta-policy on this task, for each number of exploration episodes that the
+  /// learner's settings name, ascending. A learner without an inference network has no use for any:
+  /// one return.
+  virtual std::vector<AdaptedReturn> evaluateAdapted(const Model& policy, Rng& rng) const {
+    return {{0, evaluate(policy, rng)}};
+  }
 
   /// One greedy episode of `policy` from a start drawn by `rng`.
   virtual Episode record(const Model& policy, Rng& rng) const = 0;

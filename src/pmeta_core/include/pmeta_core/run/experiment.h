@@ -64,12 +64,19 @@ class Experiment {
 
   const ExperimentSettings& settings() const { return settings_; }
   const EnvFamily& family() const { return *family_; }
-  int numTasks() const { return family_->numTasks(); }
+  int numTasks() const { return family_->numTasks(); }  ///< that are trained on
+  int numTestTasks() const;  ///< that only the meta-policy is evaluated on, numbered after those
+  int totalTasks() const { return numTasks() + numTestTasks(); }
+  bool isTestTask(int task) const { return task >= numTasks(); }
 
   bool sendsPersonal() const { return settings_.algorithm != "pmeta"; }
   bool evaluatesMeta() const { return settings_.algorithm != "independent"; }
   bool keepsPersonal() const { return settings_.personal.personal_init == "keep"; }
   int quorum() const;  ///< updates needed once the deadline has passed
+
+  /// How many exploration episodes the meta-policy is evaluated after, ascending; {0} without an
+  /// inference network.
+  std::vector<int> contextEpisodes() const;
 
   std::unique_ptr<PersonalLearner> makeLearner(int task) const;
 

@@ -14,8 +14,9 @@ struct FreshReturn {
   std::string snapshot;  ///< "last" or "best"
   int round = 0;         ///< the round it is from
   Policy policy = Policy::kPersonal;
-  int trained_task = -1;  ///< whose personal policy; -1 for the meta-policy
-  int task = 0;           ///< where it is evaluated
+  int trained_task = -1;        ///< whose personal policy; -1 for the meta-policy
+  int task = 0;                 ///< where it is evaluated
+  Split split = Split::kTrain;  ///< of `task`
   ReturnStats stats;
 };
 
@@ -26,7 +27,8 @@ struct FreshReturn {
 /// (PP), meta-policies by theirs (MP).
 class FreshEvaluation {
  public:
-  /// A round is complete: its summary, the agents as they are, and the meta-policy it gave.
+  /// A round is complete: its summary, the agents as they are (training tasks first), and the
+  /// meta-policy it gave.
   void offer(const RoundSummary& summary, const std::vector<TaskAgent>& agents,
              const MetaPolicy& meta);
 

@@ -40,8 +40,9 @@ struct TaskReturn {
   int round = 0;
   Split split = Split::kTrain;
   Policy policy = Policy::kPersonal;
-  double mean = 0;  ///< mean undiscounted return
-  double std = 0;   ///< over episodes
+  int context_episodes = 0;  ///< meta-policy: exploration episodes that it has adapted from
+  double mean = 0;           ///< mean undiscounted return
+  double std = 0;            ///< over episodes
   int episodes = 0;
   std::int64_t env_steps = 0;  ///< training transitions of this round; 0 for the meta-policy
   std::int64_t updates = 0;    ///< personalised updates of this round; 0 for the meta-policy
@@ -53,8 +54,9 @@ struct RoundSummary {
   std::string run_id;
   int round = 0;
   int rounds = 0;
-  double personal_return = 0;  ///< PP: mean over reported tasks; NaN if none
-  double meta_return = 0;      ///< MP: the same; NaN if none
+  double personal_return = 0;  ///< PP: mean over reported training tasks; NaN if none
+  double meta_return = 0;      ///< MP: the same, after adaptation; NaN if none
+  double test_return = 0;      ///< of the meta-policy on test tasks, after adaptation; NaN if none
   std::vector<int> participants;
   std::vector<int> missing;  ///< tasks whose update this round did without
   double seconds = 0;        ///< from the meta-policy's publication to the aggregation

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <map>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "pmeta_core/run/experiment.h"
@@ -19,8 +20,8 @@ struct RoundRow {
 };
 
 /// Collects returns as they arrive, in any order, and gives out complete rounds in a fixed one:
-/// personal returns by task, then meta returns by task. That makes a run's record independent of
-/// arrival order.
+/// personal returns by task, then meta returns by task and number of context episodes. That makes a
+/// run's record independent of arrival order.
 class RoundBook {
  public:
   struct Round {
@@ -42,7 +43,7 @@ class RoundBook {
   std::vector<Round> take(bool force = false);
 
   int roundsTaken() const { return next_ - 1; }
-  /// Has every task's personal return of `round` arrived?
+  /// Has every training task's personal return of `round` arrived?
   bool hasPersonal(int round) const;
   /// Tasks whose returns the oldest open round still waits for.
   std::vector<int> awaited() const;
@@ -51,11 +52,16 @@ class RoundBook {
   struct Open {
     bool closed = false;
     RoundSummary summary;
-    std::map<std::pair<int, int>, TaskReturn> results;  ///< by (policy, task)
+    std::map<std::tuple<int, int, int>, TaskReturn> results;  ///< by policy, task, context
+
+    bool hasPersonal(int task) const;
+    bool hasMeta(int task, const std::vector<int>& contexts) const;
   };
   bool isComplete(const Open& open) const;
 
-  int num_tasks_;
+  int num_tasks_;    ///< training tasks
+  int total_tasks_;  ///< with the test tasks
+  std::vector<int> contexts_;
   int rounds_;
   bool expects_meta_;
   std::string run_id_;

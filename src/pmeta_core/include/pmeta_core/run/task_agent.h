@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/protocol.h"
@@ -26,17 +27,19 @@ class TaskAgent {
   TaskAgent(const Experiment& experiment, int task);
 
   int task() const { return task_; }
+  bool trains() const { return split_ == Split::kTrain; }  ///< a test task only evaluates
   const ModelLayout& layout() const { return learner_->layout(); }
 
   /// One round from `meta`: reset, R updates, evaluation of the personal policy. Nothing if
   /// stopped. Throws Error if the meta-policy does not fit.
   std::optional<RoundResult> trainRound(const MetaPolicy& meta, const KeepGoing& keep_going = {});
 
-  /// The meta-policy on this task.
-  TaskReturn evaluateMeta(const MetaPolicy& meta) const;
+  /// The meta-policy on this task: one return for each of Experiment::contextEpisodes().
+  std::vector<TaskReturn> evaluateMeta(const MetaPolicy& meta) const;
 
-  /// A policy on this task, on at least `episodes` episodes that no round evaluates.
-  ReturnStats evaluateFresh(const Model& policy, int episodes) const;
+  /// A policy on this task, on at least `episodes` episodes that no round evaluates; a meta-policy
+  /// after the most exploration episodes it is evaluated after.
+  ReturnStats evaluateFresh(Policy kind, const Model& policy, int episodes) const;
 
   const Model& personal() const { return learner_->personal(); }
 
@@ -46,11 +49,12 @@ class TaskAgent {
 
  private:
   Rng evaluationRng() const;
-  TaskReturn evaluate(const Model& policy) const;
+  TaskReturn makeReturn(int round, Policy policy, const ReturnStats& stats) const;
 
   std::string run_id_;
   std::uint64_t seed_;
   int task_;
+  Split split_;
   int updates_per_round_;
   bool keeps_personal_;
   bool sends_personal_;
