@@ -95,8 +95,8 @@ double readSeconds(std::size_t n);
 /// arrays of n floats read and written and one read, and of a root and a division for each.
 double adamFloorSeconds(std::size_t n, int written);
 
-/// Operations a second of the fastest product of a 512 x 512 layer at batch 64.
-double sgemmCeiling();
+/// Operations a second of the fastest product of a 512 x 512 layer at that batch size.
+double sgemmCeiling(std::size_t batch);
 
 /// Seconds of a DQN update (dqn_update.h).
 double dqnUpdateSeconds();

@@ -14,10 +14,10 @@ namespace {
 // floor: its operations at the fastest product's speed, then the optimiser's floor
 void DqnUpdate64(benchmark::State& state) {
   DqnUpdate update;
-  double ceiling = sgemmCeiling();
+  double ceiling = sgemmCeiling(kBatch);
   double traffic = adamFloorSeconds(update.parameters(), 4);
   const double seconds = callSeconds(state, 1, update);
-  ceiling = std::max(ceiling, sgemmCeiling());
+  ceiling = std::max(ceiling, sgemmCeiling(kBatch));
   traffic = std::min(traffic, adamFloorSeconds(update.parameters(), 4));
   report({Part::kLoops, 0}, "DQN update, 4-512-512-2, batch 64, Adam, pull", Unit::kSeconds,
          seconds, DqnUpdate::flops() / ceiling + traffic, "products, then Adam");
@@ -33,11 +33,10 @@ void FusedAdam(benchmark::State& state) {
   pmeta::ProximalAdamSettings settings;
   settings.lambda = extras > 0 ? 15 : 0;
   pmeta::ProximalAdam optimizer(phi.data(), omega.data(), kSize, settings);
-  if (extras > 1) optimizer.followWith(target.data(), 0.005);
   double traffic = adamFloorSeconds(kSize, 3 + extras);
   const double seconds = callSeconds(state, 1, [&] {
     optimizer.beginUpdate();
-    optimizer.apply(0, gradient.data(), kSize);
+    optimizer.apply(0, gradient.data(), kSize, extras > 1 ? target.data() : nullptr, 0.005);
   });
   traffic = std::min(traffic, adamFloorSeconds(kSize, 3 + extras));
   const char* kNames[] = {"Adam, 1 M parameters", "Adam, pull, auxiliary, 1 M parameters",

@@ -128,8 +128,8 @@ BENCHMARK(Sgemm)
 
 }  // namespace
 
-double sgemmCeiling() {
-  LayerProducts products(kBatch);
+double sgemmCeiling(std::size_t batch) {
+  LayerProducts products(batch);
   const double seconds = std::min({callSeconds(60, 1, [&] { products.forward(); }),
                                    callSeconds(60, 1, [&] { products.weightGradient(); }),
                                    callSeconds(60, 1, [&] { products.inputGradient(); })});

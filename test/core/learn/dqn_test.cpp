@@ -69,7 +69,7 @@ class Descent : public Optimizer<float> {
   Descent(AlignedFloats& parameters, float rate) : parameters_(parameters), rate_(rate) {
     gradient.resize(parameters.size());
   }
-  void apply(std::size_t offset, const float* g, std::size_t n) override {
+  void move(std::size_t offset, const float* g, std::size_t n, float*, double) override {
     for (std::size_t k = 0; k < n; ++k) {
       gradient[offset + k] = g[k];
       parameters_[offset + k] -= rate_ * g[k];

@@ -16,7 +16,7 @@ namespace {
 class Recorder : public Optimizer<double> {
  public:
   explicit Recorder(QTable* q = nullptr, double rate = 0) : q_(q), rate_(rate) {}
-  void apply(std::size_t offset, const double* gradient, std::size_t n) override {
+  void move(std::size_t offset, const double* gradient, std::size_t n, double*, double) override {
     EXPECT_EQ(n, 1u);
     entries.push_back(offset);
     gradients.push_back(*gradient);

@@ -72,7 +72,7 @@ struct Reference : Optimizer<float> {
     omega = phi;
     rounded = meta.floats();
   }
-  void apply(std::size_t offset, const float* gradient, std::size_t n) override {
+  void move(std::size_t offset, const float* gradient, std::size_t n, float*, double) override {
     ++t;
     for (std::size_t k = 0; k < n; ++k) {
       const std::size_t j = offset + k;

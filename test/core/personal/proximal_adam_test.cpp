@@ -81,12 +81,11 @@ TEST_P(ProximalAdamOf, OnePassEqualsTheSeparateSteps) {
   std::vector<float> phi = noise(n, 1), omega = noise(n, 2), target = noise(n, 3);
   std::vector<float> x = phi, o = omega, y = target;
   ProximalAdam fused(phi.data(), omega.data(), n, settings);
-  fused.followWith(target.data(), 0.05);
   ProximalAdam adam(x.data(), nullptr, n, settings);
   for (std::uint64_t t = 0; t < 50; ++t) {
     std::vector<float> gradient = noise(n, 100 + t);
     fused.beginUpdate();
-    fused.apply(0, gradient.data(), n);
+    fused.apply(0, gradient.data(), n, target.data(), 0.05);
 
     if (settings.coupled) {
       for (std::size_t k = 0; k < n; ++k) gradient[k] += 20 * (x[k] - o[k]);
@@ -216,7 +215,8 @@ TEST(ProximalAdam, RefusesSettingsOutOfRange) {
   ProximalAdam fresh(&x, nullptr, 1, {});
   EXPECT_EQ(test::errorOf([&] { fresh.apply(0, &x, 1); }),
             "call beginUpdate() before Adam's apply().");
-  EXPECT_EQ(test::errorOf([&] { fresh.followWith(&x, 0); }),
+  fresh.beginUpdate();
+  EXPECT_EQ(test::errorOf([&] { fresh.apply(0, &x, 1, &x, 0); }),
             "Adam's tau is 0, but must be in (0, 1].");
 }
 
@@ -239,7 +239,6 @@ class Update {
     ProximalAdamSettings settings;
     settings.lambda = 5;
     optimizer_ = std::make_unique<ProximalAdam>(phi_.data(), omega_.data(), mlp_.size(), settings);
-    optimizer_->followWith(target_.data(), 0.01);
   }
 
   float operator()() {
@@ -251,7 +250,7 @@ class Update {
     mlp_.backward(phi_.data(), input_.data(), 32, d_q_.data(), gradient_.data(), nullptr,
                   workspace_);
     optimizer_->beginUpdate();
-    optimizer_->apply(0, gradient_.data(), mlp_.size());
+    optimizer_->apply(0, gradient_.data(), mlp_.size(), target_.data(), 0.01);
     return loss;
   }
 

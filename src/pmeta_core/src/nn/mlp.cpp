@@ -124,23 +124,39 @@ const float* Mlp::forward(const float* parameters, const float* input, std::size
 void Mlp::backward(const float* parameters, const float* input, std::size_t batch,
                    const float* d_output, float* gradient, float* d_input,
                    MlpWorkspace& workspace) const {
-  backwardThrough(parameters, input, batch, d_output, gradient, 0, spec_.inputs, d_input,
+  backwardThrough(parameters, input, batch, d_output, gradient, 0, spec_.inputs, nullptr, d_input,
                   workspace);
 }
 
-void Mlp::backwardInput(const float* parameters, std::size_t batch, const float* d_output,
-                        std::size_t first, std::size_t count, float* d_input,
-                        MlpWorkspace& workspace) const {
+void Mlp::requireInputs(std::size_t first, std::size_t count) const {
   if (first + count > spec_.inputs) {
     throw Error("the network '" + spec_.prefix + "' has " + std::to_string(spec_.inputs) +
                 " inputs, none at " + std::to_string(first + count - 1) + ".");
   }
-  backwardThrough(parameters, nullptr, batch, d_output, nullptr, first, count, d_input, workspace);
+}
+
+void Mlp::backwardInput(const float* parameters, std::size_t batch, const float* d_output,
+                        std::size_t first, std::size_t count, float* d_input,
+                        MlpWorkspace& workspace, const std::size_t* rows) const {
+  requireInputs(first, count);
+  backwardThrough(parameters, nullptr, batch, d_output, nullptr, first, count, rows, d_input,
+                  workspace);
+}
+
+void Mlp::addSharedInputGradient(const float* parameters, const float* gradient, std::size_t first,
+                                 std::size_t count, float* d_input) const {
+  requireInputs(first, count);
+  const Layer& layer = layers_.front();
+  const float* weight = parameters + layer.weight + first;
+  for (std::size_t o = 0; o < layer.outputs; ++o, weight += layer.inputs) {
+    for (std::size_t i = 0; i < count; ++i) d_input[i] += gradient[layer.bias + o] * weight[i];
+  }
 }
 
 void Mlp::backwardThrough(const float* parameters, const float* input, std::size_t batch,
                           const float* d_output, float* gradient, std::size_t first,
-                          std::size_t count, float* d_input, MlpWorkspace& workspace) const {
+                          std::size_t count, const std::size_t* rows, float* d_input,
+                          MlpWorkspace& workspace) const {
   const Kernels& kernel = kernels();
   const float* delta = d_output;
   if (spec_.dueling) {
@@ -165,7 +181,11 @@ void Mlp::backwardThrough(const float* parameters, const float* input, std::size
       return;
     }
     gemm(Transpose::kNo, Transpose::kNo, batch, in, out, 1, delta, out, weight, in, 0, next, in);
-    kernel.maskRelu(next, workspace.activations_[l - 1].data(), batch * in);
+    const float* activations = workspace.activations_[l - 1].data();
+    if (rows == nullptr) kernel.maskRelu(next, activations, batch * in);
+    for (std::size_t b = 0; rows != nullptr && b < batch; ++b) {
+      kernel.maskRelu(next + b * in, activations + rows[b] * in, in);
+    }
     // what was just written is the next layer's; the other buffer is free
     delta = next;
     next = next == workspace.next_delta_.data() ? workspace.delta_.data()

@@ -35,16 +35,12 @@ ProximalAdam::ProximalAdam(float* personal, float* auxiliary, std::size_t size,
   require(s.eta >= 0, "eta", s.eta, "at least 0");
 }
 
-void ProximalAdam::followWith(float* target, double tau) {
-  require(target == nullptr || (tau > 0 && tau <= 1), "tau", tau, "in (0, 1]");
-  target_ = target;
-  tau_ = tau;
-}
-
 void ProximalAdam::beginUpdate() { ++updates_; }
 
-void ProximalAdam::apply(std::size_t offset, const float* gradient, std::size_t n) {
+void ProximalAdam::move(std::size_t offset, const float* gradient, std::size_t n, float* target,
+                        double tau) {
   if (updates_ == 0) throw Error("call beginUpdate() before Adam's apply().");
+  require(target == nullptr || (tau > 0 && tau <= 1), "tau", tau, "in (0, 1]");
   const ProximalAdamSettings& s = settings_;
   const auto t = static_cast<double>(updates_);
   AdamPass pass;
@@ -58,10 +54,10 @@ void ProximalAdam::apply(std::size_t offset, const float* gradient, std::size_t 
   pass.pull = static_cast<float>(s.coupled ? s.lambda : s.alpha * s.lambda);
   pass.follow = static_cast<float>(s.eta * s.lambda);
   pass.coupled = s.coupled;
-  pass.tau = static_cast<float>(tau_);
-  const auto at = [offset](float* p) { return p == nullptr ? nullptr : p + offset; };
+  pass.tau = static_cast<float>(tau);
   kernels().adam(pass, personal_ + offset, first_moment_.data() + offset,
-                 second_moment_.data() + offset, gradient, at(auxiliary_), at(target_), n);
+                 second_moment_.data() + offset, gradient,
+                 auxiliary_ == nullptr ? nullptr : auxiliary_ + offset, target, n);
 }
 
 void ProximalAdam::restore(std::uint64_t updates, const AlignedFloats& first_moment,

@@ -1,6 +1,9 @@
 #include "pmeta_core/replay/replay_buffer.h"
 
 #include <algorithm>
+#include <string>
+
+#include "pmeta_core/base/error.h"
 
 namespace pmeta {
 
@@ -32,6 +35,20 @@ Transition ReplayBuffer::operator[](std::size_t slot) const {
   const float* action = observation + observation_size_;
   const float* scalars = action + action_size_;
   return {observation, action, scalars[0], scalars[1], scalars + 2};
+}
+
+void ReplayBuffer::restore(const std::vector<float>& values, std::size_t next) {
+  const std::size_t size = values.size() / stride_;
+  const bool full = size == capacity_;
+  if (values.size() % stride_ != 0 || size > capacity_ || (full ? next >= size : next != size)) {
+    throw Error("a replay of " + std::to_string(values.size()) + " numbers, next slot " +
+                std::to_string(next) + ", does not fit one of " + std::to_string(capacity_) +
+                " transitions of " + std::to_string(stride_) +
+                " numbers: restore it with the settings it was saved with.");
+  }
+  values_.assign(values.begin(), values.end());
+  size_ = size;
+  next_ = next;
 }
 
 }  // namespace pmeta

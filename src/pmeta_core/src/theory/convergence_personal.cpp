@@ -87,15 +87,17 @@ class RobbinsMonroStep : public Optimizer<double> {
   RobbinsMonroStep(Frozen& frozen, double exponent, QTable& q)
       : frozen_(frozen), exponent_(exponent), q_(q), visits_(q.size(), 0) {}
 
-  void apply(std::size_t offset, const double* gradient, std::size_t n) override {
+ private:
+  void move(std::size_t offset, const double* gradient, std::size_t n, double* target,
+            double tau) override {
     const double lambda = frozen_.lambda;
     for (std::size_t k = offset; k < offset + n; ++k) {
       const double alpha = std::pow(++visits_[k], -exponent_) / (1 + lambda);
       q_[k] -= alpha * (gradient[k - offset] + lambda * (q_[k] - frozen_.meta[k]));
+      if (target != nullptr) target[k - offset] += tau * (q_[k] - target[k - offset]);
     }
   }
 
- private:
   const Frozen& frozen_;
   double exponent_;
   QTable& q_;

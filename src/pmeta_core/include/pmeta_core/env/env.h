@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,11 @@ struct Step {
   double reward = 0;
   bool terminated = false;  ///< a terminal state: nothing to bootstrap from
   bool truncated = false;   ///< the horizon was reached: the value of the state goes on
+  /// where training is on a denser reward than the task is about: the task's own, which evaluation
+  /// returns and contexts count
+  std::optional<double> sparse_reward = std::nullopt;
+
+  double evaluatedReward() const { return sparse_reward.value_or(reward); }
 };
 
 /// One MDP. All randomness comes in as an argument; the state is the only thing that is kept.

@@ -11,8 +11,18 @@ class Optimizer {
  public:
   virtual ~Optimizer() = default;
 
-  /// Moves parameters [offset, offset + n) given the objective's gradient there.
-  virtual void apply(std::size_t offset, const Scalar* gradient, std::size_t n) = 0;
+  /// Moves parameters phi [offset, offset + n) given the objective's gradient there. Where `target`
+  /// (n scalars, not among the parameters) is not null, it follows what has moved, in the same
+  /// pass: target[k] += tau (phi'[k] - target[k]), tau in (0, 1]: Polyak averaging.
+  void apply(std::size_t offset, const Scalar* gradient, std::size_t n, Scalar* target = nullptr,
+             double tau = 0) {
+    move(offset, gradient, n, target, tau);
+  }
+
+ protected:
+  /// apply(), as each optimiser does it.
+  virtual void move(std::size_t offset, const Scalar* gradient, std::size_t n, Scalar* target,
+                    double tau) = 0;
 };
 
 }  // namespace pmeta

@@ -56,6 +56,17 @@ struct Kernels {
   float (*huberLoss)(const float* error, const float* weight, float delta, float* gradient,
                      std::size_t n);
 
+  /// n components of a Gaussian squashed by tanh, u = mean + std * noise and action = tanh(u) with
+  /// std = exp(log_std), log_std first clamped to [low, high]. Also writes deviation = std * noise
+  /// and log_density, the component's share of log pi(action) (Haarnoja et al., 2018, appendix C):
+  ///
+  ///     -noise^2 / 2 - log_std - log(2 pi) / 2 - 2 (log 2 - |u| - log(1 + exp(-2 |u|)))
+  ///
+  /// Errors are a few units of rounding of the largest summand; NaN stays NaN.
+  void (*tanhGaussian)(const float* mean, const float* log_std, const float* noise, float low,
+                       float high, float* action, float* deviation, float* log_density,
+                       std::size_t n);
+
   /// One pass over n parameters:
   ///
   ///     g      <- gradient + (coupled) lambda (phi - omega)

@@ -71,17 +71,24 @@ class Mlp {
 
   /// Gradients of a loss whose gradient by the outputs is `d_output` [batch, outputs], summed over
   /// the batch: by the parameters into `gradient` (overwritten, in the parameters' order), and by
-  /// the input into `d_input` [batch, inputs] unless that is null. Parameters, input and batch must
-  /// be those of the workspace's last forward pass.
+  /// the input into `d_input` [batch, inputs] unless that is null. Parameters and input must be
+  /// those of the workspace's last forward pass; `batch` may be less: the first rows of that pass.
   void backward(const float* parameters, const float* input, std::size_t batch,
                 const float* d_output, float* gradient, float* d_input,
                 MlpWorkspace& workspace) const;
 
   /// Gradient by the inputs [first, first + count) alone, into `d_input` [batch, count], with the
-  /// parameters frozen: how an actor sees its critic. Saves more than half of backward().
+  /// parameters frozen: how an actor sees its critic. Saves more than half of backward(). `rows`
+  /// chooses which rows of the last forward pass these are (`batch` of them; null: the first).
   void backwardInput(const float* parameters, std::size_t batch, const float* d_output,
-                     std::size_t first, std::size_t count, float* d_input,
-                     MlpWorkspace& workspace) const;
+                     std::size_t first, std::size_t count, float* d_input, MlpWorkspace& workspace,
+                     const std::size_t* rows = nullptr) const;
+
+  /// Adds to d_input[0..count) the gradient by the inputs [first, first + count) where these are
+  /// the same in every row, summed over the rows: the first layer's weights times the gradient by
+  /// its biases, which the last backward() left in `gradient`.
+  void addSharedInputGradient(const float* parameters, const float* gradient, std::size_t first,
+                              std::size_t count, float* d_input) const;
 
  private:
   friend class MlpWorkspace;
@@ -93,7 +100,8 @@ class Mlp {
 
   void backwardThrough(const float* parameters, const float* input, std::size_t batch,
                        const float* d_output, float* gradient, std::size_t first, std::size_t count,
-                       float* d_input, MlpWorkspace& workspace) const;
+                       const std::size_t* rows, float* d_input, MlpWorkspace& workspace) const;
+  void requireInputs(std::size_t first, std::size_t count) const;
 
   MlpSpec spec_;
   std::vector<Layer> layers_;  // a dueling network's heads are one layer of 1 + outputs

@@ -38,17 +38,10 @@ class ProximalAdam : public Optimizer<float> {
   ProximalAdam(float* personal, float* auxiliary, std::size_t size,
                const ProximalAdamSettings& settings);
 
-  /// Also moves `target` (null: no more) by target <- target + tau * (phi - target) in every
-  /// apply(). tau in (0, 1].
-  void followWith(float* target, double tau);
-
-  /// Counts one update. Call it once before the apply() calls that make up an update: Adam's bias
-  /// correction goes by this count.
+  /// Counts one update. Call it once before the apply() calls that make up an update, in which each
+  /// parameter has its turn once: Adam's bias correction goes by this count. apply() throws Error
+  /// if no update has begun.
   void beginUpdate();
-
-  /// The update of parameters [offset, offset + n). In one update each parameter has its turn once.
-  /// Throws Error if no update has begun.
-  void apply(std::size_t offset, const float* gradient, std::size_t n) override;
 
   const ProximalAdamSettings& settings() const { return settings_; }
   std::size_t size() const { return first_moment_.size(); }
@@ -62,11 +55,13 @@ class ProximalAdam : public Optimizer<float> {
                const AlignedFloats& second_moment);
 
  private:
+  // in one update each parameter has its turn once
+  void move(std::size_t offset, const float* gradient, std::size_t n, float* target,
+            double tau) override;
+
   float* personal_;
   float* auxiliary_;
-  float* target_ = nullptr;
   ProximalAdamSettings settings_;
-  double tau_ = 0;
   std::uint64_t updates_ = 0;
   AlignedFloats first_moment_, second_moment_;
 };

@@ -21,16 +21,6 @@ class ProximalSgd : public Optimizer<Scalar> {
         lambda_(static_cast<Scalar>(lambda)),
         eta_lambda_(static_cast<Scalar>(eta * lambda)) {}
 
-  /// phi <- phi - alpha * (gradient + lambda * (phi - omega)): eq. (per_update0), which descends
-  /// (the paper prints a plus; its appendix has the minus).
-  void apply(std::size_t offset, const Scalar* gradient, std::size_t n) override {
-    Scalar* phi = personal_ + offset;
-    const Scalar* omega = auxiliary_ + offset;
-    for (std::size_t k = 0; k < n; ++k) {
-      phi[k] -= alpha_ * (gradient[k] + lambda_ * (phi[k] - omega[k]));
-    }
-  }
-
   /// omega <- omega + eta * lambda * (phi - omega) on every parameter: eq. (local_update0).
   void moveAuxiliary() {
     for (std::size_t k = 0; k < size_; ++k) {
@@ -39,6 +29,20 @@ class ProximalSgd : public Optimizer<Scalar> {
   }
 
  private:
+  /// phi <- phi - alpha * (gradient + lambda * (phi - omega)): eq. (per_update0), which descends
+  /// (the paper prints a plus; its appendix has the minus).
+  void move(std::size_t offset, const Scalar* gradient, std::size_t n, Scalar* target,
+            double tau) override {
+    Scalar* phi = personal_ + offset;
+    const Scalar* omega = auxiliary_ + offset;
+    for (std::size_t k = 0; k < n; ++k) {
+      phi[k] -= alpha_ * (gradient[k] + lambda_ * (phi[k] - omega[k]));
+    }
+    if (target == nullptr) return;
+    for (std::size_t k = 0; k < n; ++k)
+      target[k] += static_cast<Scalar>(tau) * (phi[k] - target[k]);
+  }
+
   Scalar* personal_;
   Scalar* auxiliary_;
   std::size_t size_;

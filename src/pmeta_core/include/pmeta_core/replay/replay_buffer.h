@@ -39,6 +39,9 @@ class ReplayBuffer {
   /// All transitions as they lie in memory, slot by slot: s_t, a_t, R_n, discount, s_{t+n}.
   const std::vector<float>& values() const { return values_; }
 
+  /// Takes back what values() and next() gave. Throws Error if it does not fit this buffer.
+  void restore(const std::vector<float>& values, std::size_t next);
+
  private:
   std::size_t capacity_;
   std::size_t observation_size_;

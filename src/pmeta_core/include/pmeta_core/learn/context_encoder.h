@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/base/settings.h"
+#include "pmeta_core/nn/aligned.h"
+#include "pmeta_core/nn/mlp.h"
+#include "pmeta_core/replay/replay_buffer.h"
+
+namespace pmeta {
+
+/// Settings of the inference network and its context. Defaults are PEARL's (Rakelly et al., 2019).
+struct ContextSettings {
+  std::vector<int> hidden = {200, 200, 200};  ///< units of each hidden layer of the encoder
+  int latent_size = 5;                        ///< length of z
+  int batch_size = 100;           ///< context transitions of one update, and of one z to act with
+  int buffer_size = 1000;         ///< recent context transitions kept
+  double kl_weight = 0.1;         ///< weight of KL(q(z|c) || N(0, I))
+  bool next_observation = false;  ///< part of a context row; for tasks that differ in dynamics
+  /// While training, every how-many-th episode acts on z from the prior. These, and the random
+  /// steps of the warm-up, are the context: it then looks as at test time. 1: every episode.
+  int prior_interval = 2;
+  int exploration_episodes = 2;    ///< at test time, before z is fixed
+  bool exploration_noise = false;  ///< these act by samples instead of tanh(mean)
+};
+
+/// Binds all of them below `prefix`, e.g. "sac.context.".
+void bind(Settings& settings, const std::string& prefix, ContextSettings& context);
+
+/// q(z|c), a diagonal Gaussian; [latent_size] each.
+struct LatentPosterior {
+  std::vector<double> mean;
+  std::vector<double> variance;
+};
+
+/// Sum over dimensions of KL(q || N(0, I)) = (variance + mean^2 - 1 - log variance) / 2.
+double klToPrior(const LatentPosterior& posterior);
+
+/// q(z|c) of a set of transitions: a network maps each context row (s, a, r[, s']) to the mean mu_i
+/// and variance s_i^2 = max(softplus(.), 1e-7) of a Gaussian factor, and their product, in which
+/// the rows' order does not matter, is the posterior (PEARL; the prior is no factor):
+///
+///     variance = 1 / sum_i 1 / s_i^2,   mean = variance * sum_i mu_i / s_i^2
+///
+/// An empty context gives the prior, N(0, I). Parameters belong to the caller: blocks "encoder.*".
+class ContextEncoder {
+ public:
+  /// Room for one pass over up to `max_rows` rows.
+  struct Workspace {
+    Workspace(const ContextEncoder& encoder, std::size_t max_rows);
+
+    MlpWorkspace mlp;
+    AlignedFloats heads;            // of the last pass, [rows, 2 * latent_size]
+    AlignedFloats d_heads;          // [rows, 2 * latent_size]
+    std::vector<double> precision;  // sum_i 1 / s_i^2
+    std::vector<double> weighted;   // sum_i mu_i / s_i^2
+  };
+
+  ContextEncoder(int observation_size, int action_size, const ContextSettings& settings);
+
+  const Mlp& network() const { return network_; }
+  std::size_t latentSize() const { return latent_size_; }
+  std::size_t rowSize() const { return network_.inputs(); }
+
+  /// Writes a context row of rowSize() floats.
+  void writeRow(const Transition& transition, float* row) const;
+
+  /// q(z|c) of `rows` context rows [rows, rowSize()]; more rows than the workspace holds are taken
+  /// in pieces. Allocates nothing where `posterior` has its size already.
+  void infer(const float* parameters, const float* context, std::size_t rows, Workspace& workspace,
+             LatentPosterior& posterior) const;
+
+  /// Gradient by the parameters, into `gradient` (network().size(), overwritten), of
+  /// L(z) + kl_weight * KL, where z = mean + sqrt(variance) * noise and `d_z` is the gradient of L.
+  /// All else as in the last infer(), whose rows the workspace must hold at once.
+  void backward(const float* parameters, const float* context, std::size_t rows,
+                const LatentPosterior& posterior, const double* noise, const float* d_z,
+                double kl_weight, Workspace& workspace, float* gradient) const;
+
+ private:
+  int observation_size_;
+  int action_size_;
+  bool next_observation_;
+  std::size_t latent_size_;
+  Mlp network_;
+};
+
+}  // namespace pmeta

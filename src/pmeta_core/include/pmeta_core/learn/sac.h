@@ -1,0 +1,148 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "pmeta_core/env/env.h"
+#include "pmeta_core/learn/gaussian_policy.h"
+#include "pmeta_core/learn/optimizer.h"
+#include "pmeta_core/learn/sac_networks.h"
+#include "pmeta_core/learn/sac_settings.h"
+#include "pmeta_core/learn/temperature.h"
+#include "pmeta_core/nn/aligned.h"
+#include "pmeta_core/replay/replay_buffer.h"
+
+namespace pmeta {
+
+/// What one update of SacLearner gave.
+struct SacLosses {
+  double critic = 0;       ///< mean of both critics' losses
+  double actor = 0;        ///< mean of alpha log pi - min_k Q_k
+  double entropy = 0;      ///< minus the mean of log pi over the batch
+  double temperature = 0;  ///< alpha after the update
+  double kl = 0;           ///< KL(q(z|c) || N(0, I)); 0 without an encoder
+};
+
+/// All that SacLearner's future depends on besides settings, parameters, optimiser and generator.
+struct SacState {
+  std::vector<float> replay, context;  ///< ReplayBuffer::values()
+  std::size_t replay_next = 0, context_next = 0;
+  AlignedFloats targets;
+  Temperature::State temperature;
+  std::int64_t updates = 0;
+  std::int64_t episodes = 0;
+  bool started = false;
+  bool prior_episode = true;
+  std::vector<double> env_state;  ///< empty before the start
+  std::vector<float> observation;
+  std::vector<float> task_input;
+};
+
+/// Soft actor-critic on one task with continuous actions in [-1, 1] (Haarnoja et al., "Soft
+/// Actor-Critic Algorithms and Applications", 2018), with PEARL's inference network if wanted
+/// (Rakelly et al., 2019): environment, replay, context, target critics and temperature.
+///
+/// The parameters belong to the caller, laid out as SacNetworks says; it passes them in, and an
+/// optimiser that moves them. With x the task input, a' ~ pi(s', x) and a ~ pi(s, x):
+///
+///     y         = scale * r + discount * (min_k Qbar_k(s', x, a') - alpha log pi(a'))
+///     critic k:   mean over the batch of (Q_k(s, x, a_stored) - y)^2
+///     encoder:    the sum of both critics' losses by z + kl_weight * KL(q(z|c) || N(0, I))
+///     actor:      mean over the batch of alpha log pi(a) - min_k Q_k(s, x, a), z fixed
+///
+/// discount is gamma, 0 after a terminal state; the horizon is none. One z serves an update.
+class SacLearner {
+ public:
+  /// `task_input`: the one-hot vector with task_encoding "one_hot", else empty. Throws Error where
+  /// SacNetworks does, or if the task input does not fit the encoding.
+  SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
+             std::vector<float> task_input = {});
+
+  const SacNetworks& networks() const { return networks_; }
+
+  /// Makes the target critics copies of `parameters`'; to be called before the first update.
+  void resetTargets(const float* parameters);
+
+  /// env_steps_per_update steps by samples of the policy, kept in the replay; the first call also
+  /// starts the environment and warms it up. With an encoder, z is drawn anew for each episode:
+  /// from the prior in every prior_interval-th, whose transitions become context, else from q(z|c).
+  /// Returns the transitions made. Allocates nothing once the buffers are full.
+  std::int64_t collect(const float* parameters, Rng& rng);
+
+  /// One batch from the replay. Hands `optimizer` the gradients of critic 1 and 2 (whose targets
+  /// follow in the same pass), of the encoder, and, with the moved critics, of the actor; last, the
+  /// temperature moves. Throws Error before the first collect(). Allocates nothing.
+  SacLosses update(const float* parameters, Optimizer<float>& optimizer, Rng& rng);
+
+  /// q(z|c) by the whole context that is kept.
+  LatentPosterior contextPosterior(const float* parameters) const;
+
+  const SacSettings& settings() const { return settings_; }
+  const std::vector<float>& taskInput() const { return task_input_; }  ///< z while acting
+  const Temperature& temperature() const { return temperature_; }
+  const AlignedFloats& targets() const { return targets_; }  ///< critic 1's, then critic 2's
+  const ReplayBuffer& replay() const { return replay_; }
+  const ReplayBuffer& context() const { return context_; }  ///< rewards: Step::evaluatedReward()
+  std::int64_t updates() const { return updates_; }         ///< calls of update() so far
+  const Env& env() const { return *env_; }
+
+  /// For checkpoints. Throws Error where the environment cannot hand out its state.
+  SacState state() const;
+  /// Goes on from a state() of the same settings and task. Throws Error if it cannot be one.
+  void restore(const SacState& state);
+
+ private:
+  void beginEpisode(const float* parameters, bool warm_up, Rng& rng);
+  void step(const float* parameters, bool warm_up, Rng& rng);
+  void sampleContext(Rng& rng);
+  void sampleBatch(Rng& rng);
+  void drawTask(const float* parameters, Rng& rng);
+  void computeTargets();
+  double updateCritic(int k, const float* parameters, Optimizer<float>& optimizer);
+  void updateEncoder(const float* parameters, Optimizer<float>& optimizer);
+  double updateActor(const float* parameters, Optimizer<float>& optimizer);
+  void actionGradient(int k, const float* parameters);
+  float* target(int k) { return targets_.data() + (k == 0 ? 0 : networks_.critic(0).size()); }
+
+  std::unique_ptr<Env> env_;
+  SacSettings settings_;
+  SacNetworks networks_;
+  std::size_t batch_, observation_size_, action_size_;
+  std::vector<float> task_input_;
+  Temperature temperature_;
+  ReplayBuffer replay_, context_;
+  AlignedFloats targets_;
+  std::int64_t updates_ = 0;
+  std::int64_t episodes_ = 0;  // after the warm-up
+  bool started_ = false;
+  bool prior_episode_ = true;  // this episode's transitions become context
+
+  // of the environment
+  std::vector<float> observation_, next_observation_float_, action_float_;
+  std::vector<double> next_observation_, action_;
+  SacNetworks::ActorWorkspace acting_;
+  GaussianPolicy acting_policy_;
+
+  // of one update
+  MlpWorkspace actor_workspace_;                 // rows: s, then s'
+  std::vector<MlpWorkspace> critic_workspaces_;  // of critic 1 and 2
+  GaussianPolicy policy_;                        // rows: s, then s'
+  AlignedFloats actor_input_;                    // 2 batch x (observation, x)
+  AlignedFloats critic_input_;                   // batch x (observation, x, action)
+  AlignedFloats next_critic_input_;
+  std::vector<float> rewards_, discounts_, y_, errors_, d_q_;
+  std::vector<std::size_t> minimum_rows_[2];  // where critic 1 or 2 is the smaller one
+  AlignedFloats d_action_rows_, d_action_, d_heads_;
+  AlignedFloats gradient_;           // of one network at a time
+  std::vector<float> update_input_;  // x of this update
+  std::optional<ContextEncoder::Workspace> encoder_workspace_;
+  AlignedFloats context_rows_;
+  LatentPosterior posterior_;
+  std::vector<double> latent_noise_;
+  std::vector<float> d_latent_;
+};
+
+}  // namespace pmeta

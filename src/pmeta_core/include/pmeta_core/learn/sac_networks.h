@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "pmeta_core/env/env.h"
+#include "pmeta_core/learn/context_encoder.h"
+#include "pmeta_core/learn/sac_settings.h"
+#include "pmeta_core/nn/aligned.h"
+#include "pmeta_core/nn/mlp.h"
+
+namespace pmeta {
+
+/// The one-hot vector of `task` out of `num_tasks`. Throws Error if it is none of them.
+std::vector<float> oneHot(int task, int num_tasks);
+
+/// The networks of soft actor-critic, whose parameters lie in one flat vector as the blocks
+/// "actor.*", "critic1.*", "critic2.*" and, with task_encoding "inference", "encoder.*".
+///
+/// The actor takes [observation, task input] and gives the heads of a GaussianPolicy; a critic
+/// takes [observation, task input, action]. The task input is the same in every row: the task's
+/// one-hot vector, the encoder's z, or nothing.
+class SacNetworks {
+ public:
+  /// Room for acting on up to `max_batch` observations at once.
+  struct ActorWorkspace {
+    ActorWorkspace(const SacNetworks& networks, std::size_t max_batch);
+
+    MlpWorkspace mlp;
+    AlignedFloats input;  // [max_batch, actor inputs]
+  };
+
+  /// `num_tasks`: length of the one-hot vector; ignored unless task_encoding is "one_hot". Throws
+  /// Error if actions are discrete or there is no task to encode.
+  SacNetworks(const EnvSpec& env, const SacSettings& settings, int num_tasks);
+
+  const Mlp& actor() const { return actor_; }
+  const Mlp& critic(int k) const { return k == 0 ? critic1_ : critic2_; }  ///< k: 0 or 1
+  bool hasEncoder() const { return encoder_.has_value(); }
+  const ContextEncoder& encoder() const { return *encoder_; }  ///< only where hasEncoder()
+
+  // where each one's parameters begin; the actor's are the first
+  std::size_t criticOffset(int k) const { return actor_.size() + (k == 0 ? 0 : critic1_.size()); }
+  std::size_t encoderOffset() const { return criticOffset(1) + critic2_.size(); }
+  std::size_t size() const;           ///< number of all parameters
+  std::vector<Block> blocks() const;  ///< of all, in order
+
+  std::size_t observationSize() const { return observation_size_; }
+  std::size_t taskInputSize() const { return task_input_size_; }
+  std::size_t actionSize() const { return action_size_; }
+
+  /// Each network as Mlp::initialise() does.
+  void initialise(float* parameters, Rng& rng) const;
+
+  /// Heads [batch, 2 * action_size] for `observations` [batch, observation_size], each with
+  /// `task_input` appended. They lie in the workspace.
+  const float* heads(const float* parameters, const float* observations, std::size_t batch,
+                     const float* task_input, ActorWorkspace& workspace) const;
+
+  /// Writes tanh(mean) for each observation, [batch, action_size].
+  void greedyActions(const float* parameters, const float* observations, std::size_t batch,
+                     const float* task_input, ActorWorkspace& workspace, double* actions) const;
+
+ private:
+  std::size_t observation_size_;
+  std::size_t action_size_;
+  std::size_t task_input_size_;
+  Mlp actor_, critic1_, critic2_;
+  std::optional<ContextEncoder> encoder_;
+};
+
+}  // namespace pmeta

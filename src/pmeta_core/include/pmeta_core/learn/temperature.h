@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "pmeta_core/base/settings.h"
+
+namespace pmeta {
+
+/// Settings of the entropy temperature.
+struct TemperatureSettings {
+  std::string temperature = "auto";         ///< "auto": follows a target entropy; "fixed": stays
+  double initial_temperature = 0.2;         ///< positive
+  double target_entropy = 0;                ///< in nats; 0: minus the number of action components
+  double temperature_learning_rate = 1e-3;  ///< Adam's
+};
+
+/// Binds all of them below `prefix`, e.g. "sac.".
+void bind(Settings& settings, const std::string& prefix, TemperatureSettings& temperature);
+
+/// The weight alpha of the entropy in soft actor-critic: fixed, or Adam on log alpha with the loss
+///
+///     -log alpha * (mean of log pi + target entropy)
+///
+/// so that it grows while the policy's entropy is below its target (Haarnoja et al., "Soft
+/// Actor-Critic Algorithms and Applications", 2018, eq. 18, by log alpha).
+class Temperature {
+ public:
+  /// All that the next update depends on.
+  struct State {
+    double log_value = 0;
+    double first_moment = 0;
+    double second_moment = 0;
+    std::int64_t updates = 0;
+  };
+
+  Temperature(const TemperatureSettings& settings, int action_size);
+
+  double value() const;  ///< alpha
+  double targetEntropy() const { return target_entropy_; }
+
+  /// Derivative of the loss by log alpha.
+  double gradient(double mean_log_prob) const { return -(mean_log_prob + target_entropy_); }
+
+  /// One step of Adam, given the mean of log pi over a batch; nothing where alpha is fixed.
+  void update(double mean_log_prob);
+
+  const State& state() const { return state_; }
+  void restore(const State& state) { state_ = state; }
+
+ private:
+  bool automatic_;
+  double target_entropy_;
+  double learning_rate_;
+  State state_;
+};
+
+}  // namespace pmeta

@@ -1,0 +1,354 @@
+#include "pmeta_core/learn/sac.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/nn/kernels.h"
+
+namespace pmeta {
+namespace {
+
+std::vector<float> requireTaskInput(std::vector<float> task_input, const SacSettings& settings) {
+  if ((settings.task_encoding == "one_hot") == task_input.empty()) {
+    throw Error("soft actor-critic takes a task input of " + std::to_string(task_input.size()) +
+                " numbers with task_encoding '" + settings.task_encoding +
+                "': give the one-hot vector with one_hot, and nothing otherwise.");
+  }
+  return task_input;
+}
+
+std::size_t contextCapacity(const SacSettings& settings) {
+  const bool used = settings.task_encoding == "inference";
+  return used ? static_cast<std::size_t>(settings.context.buffer_size) : 1;
+}
+
+}  // namespace
+
+SacLearner::SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
+                       std::vector<float> task_input)
+    : env_(std::move(env)),
+      settings_(settings),
+      networks_(env_->spec(), settings, static_cast<int>(task_input.size())),
+      batch_(static_cast<std::size_t>(settings.batch_size)),
+      observation_size_(networks_.observationSize()),
+      action_size_(networks_.actionSize()),
+      task_input_(requireTaskInput(std::move(task_input), settings)),
+      temperature_(settings.temperature, env_->spec().action_size),
+      replay_(static_cast<std::size_t>(settings.buffer_size), env_->spec().observation_size,
+              env_->spec().action_size),
+      context_(contextCapacity(settings), env_->spec().observation_size, env_->spec().action_size),
+      targets_(networks_.critic(0).size() + networks_.critic(1).size()),
+      observation_(observation_size_),
+      next_observation_float_(observation_size_),
+      action_float_(action_size_),
+      next_observation_(observation_size_),
+      action_(action_size_),
+      acting_(networks_, 1),
+      acting_policy_(action_size_, 1),
+      actor_workspace_(networks_.actor(), 2 * batch_),
+      policy_(action_size_, 2 * batch_),
+      actor_input_(2 * batch_ * networks_.actor().inputs()),
+      critic_input_(batch_ * networks_.critic(0).inputs()),
+      next_critic_input_(critic_input_),
+      rewards_(batch_),
+      discounts_(batch_),
+      y_(batch_),
+      errors_(batch_),
+      d_q_(batch_),
+      d_action_rows_(batch_ * action_size_),
+      d_action_(batch_ * action_size_),
+      d_heads_(2 * batch_ * action_size_),
+      gradient_(std::max(networks_.actor().size(), networks_.critic(0).size())) {
+  for (int k = 0; k < 2; ++k) {
+    critic_workspaces_.emplace_back(networks_.critic(k), batch_);
+    minimum_rows_[k].reserve(batch_);
+  }
+  if (networks_.hasEncoder()) {
+    const ContextEncoder& encoder = networks_.encoder();
+    const auto rows = static_cast<std::size_t>(settings.context.batch_size);
+    encoder_workspace_.emplace(encoder, rows);
+    context_rows_.resize(rows * encoder.rowSize());
+    posterior_.mean.resize(encoder.latentSize());
+    posterior_.variance.resize(encoder.latentSize());
+    latent_noise_.resize(encoder.latentSize());
+    d_latent_.resize(encoder.latentSize());
+    task_input_.resize(encoder.latentSize());
+    gradient_.resize(std::max(gradient_.size(), encoder.network().size()));
+  }
+  update_input_ = task_input_;
+}
+
+void SacLearner::resetTargets(const float* parameters) {
+  for (int k = 0; k < 2; ++k) {
+    std::copy_n(parameters + networks_.criticOffset(k), networks_.critic(k).size(), target(k));
+  }
+}
+
+std::int64_t SacLearner::collect(const float* parameters, Rng& rng) {
+  int warm_up_steps = 0;
+  if (!started_) {
+    started_ = true;
+    warm_up_steps = settings_.warm_up_steps;
+    beginEpisode(parameters, true, rng);
+    for (int t = 0; t < warm_up_steps; ++t) step(parameters, true, rng);
+  }
+  for (int t = 0; t < settings_.env_steps_per_update; ++t) step(parameters, false, rng);
+  return warm_up_steps + settings_.env_steps_per_update;
+}
+
+void SacLearner::beginEpisode(const float* parameters, bool warm_up, Rng& rng) {
+  env_->reset(rng, next_observation_.data());
+  std::copy(next_observation_.begin(), next_observation_.end(), observation_.begin());
+  prior_episode_ = warm_up || episodes_ % settings_.context.prior_interval == 0;
+  episodes_ += warm_up ? 0 : 1;
+  if (!networks_.hasEncoder()) return;
+  if (prior_episode_) {
+    for (float& z : task_input_) z = static_cast<float>(rng.normal());
+    return;
+  }
+  drawTask(parameters, rng);
+  task_input_ = update_input_;
+}
+
+void SacLearner::step(const float* parameters, bool warm_up, Rng& rng) {
+  if (warm_up) {
+    for (float& a : action_float_) a = static_cast<float>(2 * rng.uniform() - 1);
+  } else {
+    acting_policy_.sample(
+        networks_.heads(parameters, observation_.data(), 1, task_input_.data(), acting_), 1, rng);
+    std::copy_n(acting_policy_.actions(), action_size_, action_float_.begin());
+  }
+  std::copy(action_float_.begin(), action_float_.end(), action_.begin());
+  const Step step = env_->step(action_.data(), rng, next_observation_.data());
+  std::copy(next_observation_.begin(), next_observation_.end(), next_observation_float_.begin());
+
+  Transition transition{observation_.data(), action_float_.data(), static_cast<float>(step.reward),
+                        step.terminated ? 0.0f : static_cast<float>(settings_.gamma),
+                        next_observation_float_.data()};
+  replay_.add(transition);
+  if (networks_.hasEncoder() && prior_episode_) {
+    transition.reward = static_cast<float>(step.evaluatedReward());
+    context_.add(transition);
+  }
+  std::swap(observation_, next_observation_float_);
+  if (step.terminated || step.truncated) beginEpisode(parameters, warm_up, rng);
+}
+
+void SacLearner::sampleContext(Rng& rng) {
+  const std::size_t size = networks_.encoder().rowSize();
+  for (std::size_t i = 0; i < context_rows_.size(); i += size) {
+    networks_.encoder().writeRow(context_[rng.below(context_.size())], &context_rows_[i]);
+  }
+}
+
+void SacLearner::drawTask(const float* parameters, Rng& rng) {
+  const ContextEncoder& encoder = networks_.encoder();
+  sampleContext(rng);
+  encoder.infer(parameters + networks_.encoderOffset(), context_rows_.data(),
+                context_rows_.size() / encoder.rowSize(), *encoder_workspace_, posterior_);
+  for (std::size_t j = 0; j < latent_noise_.size(); ++j) {
+    latent_noise_[j] = rng.normal();
+    update_input_[j] = static_cast<float>(posterior_.mean[j] +
+                                          std::sqrt(posterior_.variance[j]) * latent_noise_[j]);
+  }
+}
+
+// inputs of all networks; the next actions are not known yet
+void SacLearner::sampleBatch(Rng& rng) {
+  const std::size_t actor_row = networks_.actor().inputs();
+  const auto write = [&](const float* observation, float* actor, float* critic) {
+    std::copy_n(observation, observation_size_, actor);
+    std::copy(update_input_.begin(), update_input_.end(), actor + observation_size_);
+    return std::copy_n(actor, actor_row, critic);
+  };
+  for (std::size_t b = 0; b < batch_; ++b) {
+    const Transition t = replay_[rng.below(replay_.size())];
+    const std::size_t critic_row = b * networks_.critic(0).inputs();
+    float* action = write(t.observation, &actor_input_[b * actor_row], &critic_input_[critic_row]);
+    std::copy_n(t.action, action_size_, action);
+    write(t.next_observation, &actor_input_[(batch_ + b) * actor_row],
+          &next_critic_input_[critic_row]);
+    rewards_[b] = t.reward;
+    discounts_[b] = t.discount;
+  }
+}
+
+SacLosses SacLearner::update(const float* parameters, Optimizer<float>& optimizer, Rng& rng) {
+  if (replay_.size() == 0) throw Error("call collect() before soft actor-critic's update().");
+  if (networks_.hasEncoder()) {
+    drawTask(parameters, rng);
+    std::fill(d_latent_.begin(), d_latent_.end(), 0.0f);
+  }
+  sampleBatch(rng);
+  // one pass for the actions in s' and in s: the actor does not move before its own step
+  const float* heads =
+      networks_.actor().forward(parameters, actor_input_.data(), 2 * batch_, actor_workspace_);
+  policy_.sample(heads, 2 * batch_, rng);
+  computeTargets();
+
+  SacLosses losses;
+  for (int k = 0; k < 2; ++k) losses.critic += 0.5 * updateCritic(k, parameters, optimizer);
+  if (networks_.hasEncoder()) {
+    losses.kl = klToPrior(posterior_);
+    updateEncoder(parameters, optimizer);
+  }
+  losses.actor = updateActor(parameters, optimizer);
+
+  double mean_log_prob = 0;
+  for (std::size_t b = 0; b < batch_; ++b) mean_log_prob += policy_.logProbs()[b];
+  mean_log_prob /= static_cast<double>(batch_);
+  temperature_.update(mean_log_prob);
+  losses.entropy = -mean_log_prob;
+  losses.temperature = temperature_.value();
+  ++updates_;
+  return losses;
+}
+
+void SacLearner::computeTargets() {
+  const std::size_t row = networks_.critic(0).inputs();
+  const float* next_actions = policy_.actions() + batch_ * action_size_;
+  for (std::size_t b = 0; b < batch_; ++b) {
+    std::copy_n(next_actions + b * action_size_, action_size_,
+                &next_critic_input_[(b + 1) * row - action_size_]);
+  }
+  const float* q[2];
+  for (int k = 0; k < 2; ++k) {
+    q[k] = networks_.critic(k).forward(target(k), next_critic_input_.data(), batch_,
+                                       critic_workspaces_[static_cast<std::size_t>(k)]);
+  }
+  const float* log_prob = policy_.logProbs() + batch_;
+  const auto alpha = static_cast<float>(temperature_.value());
+  const auto scale = static_cast<float>(settings_.reward_scale);
+  for (std::size_t b = 0; b < batch_; ++b) {
+    const float smaller = q[0][b] <= q[1][b] ? q[0][b] : q[1][b];
+    y_[b] = scale * rewards_[b] + discounts_[b] * (smaller - alpha * log_prob[b]);
+  }
+}
+
+double SacLearner::updateCritic(int k, const float* parameters, Optimizer<float>& optimizer) {
+  const Mlp& critic = networks_.critic(k);
+  const float* theta = parameters + networks_.criticOffset(k);
+  MlpWorkspace& workspace = critic_workspaces_[static_cast<std::size_t>(k)];
+  const float* q = critic.forward(theta, critic_input_.data(), batch_, workspace);
+  for (std::size_t b = 0; b < batch_; ++b) errors_[b] = q[b] - y_[b];
+  const double loss = kernels().squaredLoss(errors_.data(), nullptr, d_q_.data(), batch_);
+  critic.backward(theta, critic_input_.data(), batch_, d_q_.data(), gradient_.data(), nullptr,
+                  workspace);
+  // every row has the same z
+  if (networks_.hasEncoder()) {
+    critic.addSharedInputGradient(theta, gradient_.data(), observation_size_, d_latent_.size(),
+                                  d_latent_.data());
+  }
+  optimizer.apply(networks_.criticOffset(k), gradient_.data(), critic.size(), target(k),
+                  settings_.tau);
+  return loss;
+}
+
+void SacLearner::updateEncoder(const float* parameters, Optimizer<float>& optimizer) {
+  const ContextEncoder& encoder = networks_.encoder();
+  encoder.backward(parameters + networks_.encoderOffset(), context_rows_.data(),
+                   context_rows_.size() / encoder.rowSize(), posterior_, latent_noise_.data(),
+                   d_latent_.data(), settings_.context.kl_weight, *encoder_workspace_,
+                   gradient_.data());
+  optimizer.apply(networks_.encoderOffset(), gradient_.data(), encoder.network().size());
+}
+
+double SacLearner::updateActor(const float* parameters, Optimizer<float>& optimizer) {
+  const std::size_t row = networks_.critic(0).inputs();
+  for (std::size_t b = 0; b < batch_; ++b) {
+    std::copy_n(policy_.actions() + b * action_size_, action_size_,
+                &critic_input_[(b + 1) * row - action_size_]);
+  }
+  const float* q[2];
+  for (int k = 0; k < 2; ++k) {
+    q[k] = networks_.critic(k).forward(parameters + networks_.criticOffset(k), critic_input_.data(),
+                                       batch_, critic_workspaces_[static_cast<std::size_t>(k)]);
+    minimum_rows_[k].clear();
+  }
+  const double alpha = temperature_.value();
+  double loss = 0;
+  for (std::size_t b = 0; b < batch_; ++b) {
+    const int k = q[0][b] <= q[1][b] ? 0 : 1;
+    minimum_rows_[k].push_back(b);
+    loss += alpha * policy_.logProbs()[b] - q[k][b];
+  }
+  const auto n = static_cast<float>(batch_);
+  std::fill(d_q_.begin(), d_q_.end(), -1 / n);
+  for (int k = 0; k < 2; ++k) actionGradient(k, parameters);
+
+  policy_.backward(batch_, d_action_.data(), static_cast<float>(alpha) / n, d_heads_.data());
+  networks_.actor().backward(parameters, actor_input_.data(), batch_, d_heads_.data(),
+                             gradient_.data(), nullptr, actor_workspace_);
+  optimizer.apply(0, gradient_.data(), networks_.actor().size());
+  return loss / static_cast<double>(batch_);
+}
+
+// gradient by the actions of those samples whose smaller critic is k
+void SacLearner::actionGradient(int k, const float* parameters) {
+  const std::vector<std::size_t>& rows = minimum_rows_[k];
+  if (rows.empty()) return;
+  networks_.critic(k).backwardInput(parameters + networks_.criticOffset(k), rows.size(),
+                                    d_q_.data(), networks_.actor().inputs(), action_size_,
+                                    d_action_rows_.data(),
+                                    critic_workspaces_[static_cast<std::size_t>(k)], rows.data());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    std::copy_n(&d_action_rows_[i * action_size_], action_size_,
+                &d_action_[rows[i] * action_size_]);
+  }
+}
+
+LatentPosterior SacLearner::contextPosterior(const float* parameters) const {
+  if (!networks_.hasEncoder()) throw Error("there is no context encoder to ask for z.");
+  const ContextEncoder& encoder = networks_.encoder();
+  std::vector<float> rows(context_.size() * encoder.rowSize());
+  for (std::size_t i = 0; i < context_.size(); ++i) {
+    encoder.writeRow(context_[i], &rows[i * encoder.rowSize()]);
+  }
+  ContextEncoder::Workspace workspace(encoder, std::max<std::size_t>(1, context_.size()));
+  LatentPosterior posterior;
+  encoder.infer(parameters + networks_.encoderOffset(), rows.data(), context_.size(), workspace,
+                posterior);
+  return posterior;
+}
+
+SacState SacLearner::state() const {
+  SacState state;
+  state.replay = replay_.values();
+  state.replay_next = replay_.next();
+  state.context = context_.values();
+  state.context_next = context_.next();
+  state.targets = targets_;
+  state.temperature = temperature_.state();
+  state.updates = updates_;
+  state.episodes = episodes_;
+  state.started = started_;
+  state.prior_episode = prior_episode_;
+  if (started_) state.env_state = env_->state();
+  state.observation = observation_;
+  state.task_input = task_input_;
+  return state;
+}
+
+void SacLearner::restore(const SacState& state) {
+  if (state.targets.size() != targets_.size() || state.observation.size() != observation_size_ ||
+      state.task_input.size() != task_input_.size()) {
+    throw Error(
+        "a state of soft actor-critic does not fit these networks: restore it with the "
+        "settings and the task it was saved with.");
+  }
+  replay_.restore(state.replay, state.replay_next);
+  context_.restore(state.context, state.context_next);
+  if (state.started) env_->setState(state.env_state);
+  targets_ = state.targets;
+  temperature_.restore(state.temperature);
+  updates_ = state.updates;
+  episodes_ = state.episodes;
+  started_ = state.started;
+  prior_episode_ = state.prior_episode;
+  observation_ = state.observation;
+  task_input_ = state.task_input;
+}
+
+}  // namespace pmeta

@@ -1,0 +1,106 @@
+#include "pmeta_core/learn/sac_networks.h"
+
+#include <algorithm>
+#include <string>
+
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/learn/gaussian_policy.h"
+
+namespace pmeta {
+namespace {
+
+std::size_t taskInputs(const SacSettings& settings, int num_tasks) {
+  if (settings.task_encoding == "none") return 0;
+  if (settings.task_encoding == "inference") {
+    return static_cast<std::size_t>(settings.context.latent_size);
+  }
+  if (num_tasks < 1) throw Error("a one-hot task input needs the number of tasks, at least one.");
+  return static_cast<std::size_t>(num_tasks);
+}
+
+const EnvSpec& requireContinuous(const EnvSpec& env) {
+  if (env.num_actions > 0) {
+    throw Error("environment '" + env.name +
+                "' has discrete actions: soft actor-critic needs continuous ones.");
+  }
+  return env;
+}
+
+MlpSpec network(const char* prefix, const SacSettings& settings, std::size_t inputs,
+                std::size_t outputs) {
+  MlpSpec spec;
+  spec.prefix = prefix;
+  spec.inputs = inputs;
+  spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
+  spec.outputs = outputs;
+  return spec;
+}
+
+}  // namespace
+
+std::vector<float> oneHot(int task, int num_tasks) {
+  if (task < 0 || task >= num_tasks) {
+    throw Error("task " + std::to_string(task) + " is none of " + std::to_string(num_tasks) + ".");
+  }
+  std::vector<float> vector(static_cast<std::size_t>(num_tasks));
+  vector[static_cast<std::size_t>(task)] = 1;
+  return vector;
+}
+
+SacNetworks::ActorWorkspace::ActorWorkspace(const SacNetworks& networks, std::size_t max_batch)
+    : mlp(networks.actor(), max_batch), input(max_batch * networks.actor().inputs()) {}
+
+SacNetworks::SacNetworks(const EnvSpec& env, const SacSettings& settings, int num_tasks)
+    : observation_size_(static_cast<std::size_t>(requireContinuous(env).observation_size)),
+      action_size_(static_cast<std::size_t>(env.action_size)),
+      task_input_size_(taskInputs(settings, num_tasks)),
+      actor_(network("actor", settings, observation_size_ + task_input_size_, 2 * action_size_)),
+      critic1_(
+          network("critic1", settings, observation_size_ + task_input_size_ + action_size_, 1)),
+      critic2_(network("critic2", settings, critic1_.inputs(), 1)) {
+  if (settings.task_encoding == "inference") {
+    encoder_.emplace(env.observation_size, env.action_size, settings.context);
+  }
+}
+
+std::size_t SacNetworks::size() const {
+  return encoderOffset() + (hasEncoder() ? encoder_->network().size() : 0);
+}
+
+std::vector<Block> SacNetworks::blocks() const {
+  std::vector<Block> all;
+  const auto append = [&](const Mlp& mlp) {
+    all.insert(all.end(), mlp.blocks().begin(), mlp.blocks().end());
+  };
+  append(actor_);
+  append(critic1_);
+  append(critic2_);
+  if (hasEncoder()) append(encoder_->network());
+  return all;
+}
+
+void SacNetworks::initialise(float* parameters, Rng& rng) const {
+  actor_.initialise(parameters, rng);
+  for (int k = 0; k < 2; ++k) critic(k).initialise(parameters + criticOffset(k), rng);
+  if (hasEncoder()) encoder_->network().initialise(parameters + encoderOffset(), rng);
+}
+
+const float* SacNetworks::heads(const float* parameters, const float* observations,
+                                std::size_t batch, const float* task_input,
+                                ActorWorkspace& workspace) const {
+  float* row = workspace.input.data();
+  for (std::size_t b = 0; b < std::min(batch, workspace.mlp.maxBatch()); ++b) {
+    row = std::copy_n(observations + b * observation_size_, observation_size_, row);
+    row = std::copy_n(task_input, task_input_size_, row);
+  }
+  return actor_.forward(parameters, workspace.input.data(), batch, workspace.mlp);
+}
+
+void SacNetworks::greedyActions(const float* parameters, const float* observations,
+                                std::size_t batch, const float* task_input,
+                                ActorWorkspace& workspace, double* actions) const {
+  meanActions(heads(parameters, observations, batch, task_input, workspace), batch, action_size_,
+              actions);
+}
+
+}  // namespace pmeta
