@@ -36,7 +36,7 @@ TEST(FreshEvaluation, GivesEveryKeptPolicyOnItsTasks) {
       EXPECT_EQ(row.round, 4);
     }
   }
-  EXPECT_EQ(rows.size(), 4u);
+  EXPECT_EQ(rows.size(), 5u);
   for (const auto& entry : rows) EXPECT_EQ(entry.second, 2);
 }
 
@@ -57,9 +57,29 @@ TEST(FreshEvaluation, TheBestRoundIsTheOneOfTheHighestMean) {
   }
 }
 
+TEST(FreshEvaluation, OwnBestIsEachTasksBestRound) {
+  const LocalResult result = runLocally(deep({}));
+  std::map<int, std::pair<double, int>> best;
+  for (const auto& round : result.rounds) {
+    for (const RoundRow& row : round.rows) {
+      if (row.result.policy != Policy::kPersonal) continue;
+      auto& entry = best.emplace(row.result.task, std::make_pair(-1.0, 0)).first->second;
+      if (row.result.mean > entry.first) entry = {row.result.mean, row.result.round};
+    }
+  }
+  int seen = 0;
+  for (const FreshReturn& row : result.fresh) {
+    if (row.snapshot != "own_best") continue;
+    ++seen;
+    EXPECT_EQ(row.round, best.at(row.task).second);
+    EXPECT_EQ(row.trained_task, row.task);
+  }
+  EXPECT_EQ(seen, 2);
+}
+
 TEST(FreshEvaluation, IndependentPoliciesAreCrossedAndHaveNoMeta) {
   const LocalResult result = runLocally(deep({"algorithm:=independent"}));
-  EXPECT_EQ(result.fresh.size(), 2u * 2 * 2);
+  EXPECT_EQ(result.fresh.size(), 2u * 2 * 2 + 2);
   for (const FreshReturn& row : result.fresh) EXPECT_EQ(row.policy, Policy::kPersonal);
 }
 

@@ -12,6 +12,7 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/personal/dqn_personal_learner.h"
+#include "pmeta_core/personal/sac_personal_learner.h"
 
 namespace pmeta {
 namespace {
@@ -74,7 +75,7 @@ std::vector<YAML::Node> choosePreset(YAML::Node base, const std::string& source,
               (known.empty() ? " has none." : " has " + join(known) + "."));
 }
 
-const std::vector<std::string> kLearners = {"q_learning", "dqn"};
+const std::vector<std::string> kLearners = {"q_learning", "dqn", "sac"};
 
 // six digits, so that a limit that is named is allowed
 std::string roundedDown(double value) {
@@ -98,7 +99,9 @@ void Experiment::bind(Settings& s) {
   s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
   s.bind("preset", e.preset, "variant of the settings file; \"\" for none");
   s.bind("algorithm", e.algorithm, "what is trained", {"pmeta", "model_averaging", "independent"});
-  s.bind("learner", e.learner, "q_learning for tables, dqn for networks", kLearners);
+  s.bind("learner", e.learner,
+         "q_learning for tables, dqn for networks, sac for networks with continuous actions",
+         kLearners);
   s.bind("seed", e.seed, "one seed, one result", Range::atLeast(0));
   s.bind("rounds", e.rounds, "C: how often the meta-policy is aggregated", Range::between(1, 1e6));
   s.bind("updates_per_round", e.updates_per_round, "R: personalised and auxiliary updates a round",
@@ -136,12 +139,13 @@ void Experiment::bind(Settings& s) {
 
 void Experiment::bindLearner(Settings& s) {
   ExperimentSettings& e = settings_;
-  if (e.learner != "dqn") return pmeta::bind(s, "q_learning.", e.q_learning);
+  if (e.learner == "q_learning") return pmeta::bind(s, "q_learning.", e.q_learning);
   s.bind("personal.learning_rate", e.personal.learning_rate, "Adam's learning rate",
          Range::above(0));
   s.bind("personal.proximal", e.personal.proximal,
          "the pull after Adam's step, or in the gradient that Adam gets", {"decoupled", "coupled"});
-  pmeta::bind(s, "dqn.", e.dqn);
+  if (e.learner == "dqn") pmeta::bind(s, "dqn.", e.dqn);
+  if (e.learner == "sac") pmeta::bind(s, "sac.", e.sac);
 }
 
 Experiment Experiment::build(const YAML::Node& root, const std::string& source,
@@ -233,9 +237,18 @@ void Experiment::checkStability() {
   }
 }
 
-int Experiment::numTestTasks() const { return evaluatesMeta() ? family_->numTestTasks() : 0; }
+int Experiment::numTestTasks() const {
+  // a one-hot input has no place for a task that was not trained on
+  const bool can_serve = settings_.learner != "sac" || settings_.sac.task_encoding != "one_hot";
+  return evaluatesMeta() && can_serve ? family_->numTestTasks() : 0;
+}
 
-std::vector<int> Experiment::contextEpisodes() const { return {0}; }
+std::vector<int> Experiment::contextEpisodes() const {
+  std::vector<int> counts = {0};
+  if (settings_.learner != "sac" || settings_.sac.task_encoding != "inference") return counts;
+  for (const int count : settings_.sac.context.exploration_episodes) counts.push_back(count);
+  return counts;
+}
 
 int Experiment::quorum() const {
   return settings_.aggregation.quorum == 0 ? numTasks() : settings_.aggregation.quorum;
@@ -243,16 +256,19 @@ int Experiment::quorum() const {
 
 std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
   const ExperimentSettings& e = settings_;
-  if (e.learner == "dqn") {
+  if (e.learner != "q_learning") {
     ProximalAdamSettings optimizer;
     optimizer.learning_rate = e.personal.learning_rate;
     optimizer.alpha = e.personal.alpha;
     optimizer.lambda = e.personal.lambda;
     optimizer.eta = e.personal.eta;
     optimizer.coupled = e.personal.proximal == "coupled";
-    return std::make_unique<DqnPersonalLearner>(
-        [family = family_, task] { return family->make(task); }, e.dqn, optimizer,
-        static_cast<std::int64_t>(e.rounds) * e.updates_per_round);
+    const auto make_env = [family = family_, task] { return family->make(task); };
+    if (e.learner == "dqn") {
+      return std::make_unique<DqnPersonalLearner>(
+          make_env, e.dqn, optimizer, static_cast<std::int64_t>(e.rounds) * e.updates_per_round);
+    }
+    return std::make_unique<SacPersonalLearner>(make_env, e.sac, optimizer, task, numTasks());
   }
   std::unique_ptr<Env> env = family_->make(task);
   auto* tabular = dynamic_cast<TabularEnv*>(env.get());

@@ -4,8 +4,9 @@
 
 namespace pmeta {
 
-void FreshEvaluation::offer(const RoundSummary& summary, const std::vector<TaskAgent>& agents,
+void FreshEvaluation::offer(const RoundBook::Round& round, const std::vector<TaskAgent>& agents,
                             const MetaPolicy& meta) {
+  const RoundSummary& summary = round.summary;
   std::vector<Model> personal;
   for (const TaskAgent& agent : agents) {
     if (agent.trains()) personal.push_back(agent.personal());
@@ -15,6 +16,13 @@ void FreshEvaluation::offer(const RoundSummary& summary, const std::vector<TaskA
   // a missing return is not a number, and never better
   if (last_personal_.value > best_personal_.value) best_personal_ = last_personal_;
   if (last_meta_.value > best_meta_.value) best_meta_ = last_meta_;
+  own_best_.resize(last_personal_.models.size());
+  for (const RoundRow& row : round.rows) {
+    if (row.result.policy != Policy::kPersonal) continue;
+    Kept& kept = own_best_[static_cast<std::size_t>(row.result.task)];
+    if (!(row.result.mean > kept.value)) continue;
+    kept = {summary.round, row.result.mean, {agents[row.result.task].personal()}};
+  }
 }
 
 std::vector<FreshReturn> FreshEvaluation::evaluate(const std::vector<TaskAgent>& agents,
@@ -41,6 +49,12 @@ std::vector<FreshReturn> FreshEvaluation::evaluate(const std::vector<TaskAgent>&
   };
   personal("last", last_personal_);
   personal("best", best_personal_);
+  for (int task = 0; task < n; ++task) {
+    if (own_best_[task].models.empty()) continue;
+    rows.push_back(
+        {"own_best", own_best_[task].round, Policy::kPersonal, task, task, Split::kTrain,
+         agents[task].evaluateFresh(Policy::kPersonal, own_best_[task].models[0], episodes)});
+  }
   // without a meta return there is no meta-policy to speak of
   if (!best_meta_.models.empty()) {
     meta("last", last_meta_);

@@ -46,7 +46,7 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
       for (const TaskReturn& result : agent.evaluateMeta(aggregator.metaPolicy())) book.add(result);
     }
     for (RoundBook::Round& done : book.take()) {
-      if (fresh_episodes > 0) fresh.offer(done.summary, agents, aggregator.metaPolicy());
+      if (fresh_episodes > 0) fresh.offer(done, agents, aggregator.metaPolicy());
       if (log != nullptr) log->write(done);
       if (on_round && !on_round(done.summary)) {
         result.stopped = round < experiment.settings().rounds;

@@ -10,6 +10,7 @@
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/env/env.h"
 #include "pmeta_core/learn/dqn.h"
+#include "pmeta_core/learn/sac_settings.h"
 #include "pmeta_core/personal/personal_learner.h"
 #include "pmeta_core/personal/tabular_personal_learner.h"
 
@@ -27,7 +28,7 @@ struct ExperimentSettings {
   std::string experiment = "experiment";
   std::string preset;                  ///< which of the file's presets; "" for none
   std::string algorithm = "pmeta";     ///< pmeta, model_averaging or independent
-  std::string learner = "q_learning";  ///< q_learning (tables) or dqn (networks)
+  std::string learner = "q_learning";  ///< q_learning (tables), dqn or sac (networks)
   std::int64_t seed = 0;
   int rounds = 10;            ///< C
   int updates_per_round = 3;  ///< R
@@ -39,6 +40,7 @@ struct ExperimentSettings {
   PersonalSettings personal;
   QLearningSettings q_learning;  ///< with learner q_learning
   DqnSettings dqn;               ///< with learner dqn
+  SacSettings sac;               ///< with learner sac
   AggregationSettings aggregation;
   std::string environment = "gridworld";
 };

@@ -5,13 +5,14 @@
 #include <vector>
 
 #include "pmeta_core/run/protocol.h"
+#include "pmeta_core/run/run_log.h"
 #include "pmeta_core/run/task_agent.h"
 
 namespace pmeta {
 
 /// One line of final.csv: a kept policy on one task, on episodes that chose nothing.
 struct FreshReturn {
-  std::string snapshot;  ///< "last" or "best"
+  std::string snapshot;  ///< "last", "best" or "own_best"
   int round = 0;         ///< the round it is from
   Policy policy = Policy::kPersonal;
   int trained_task = -1;        ///< whose personal policy; -1 for the meta-policy
@@ -24,12 +25,13 @@ struct FreshReturn {
 ///
 /// The best round of a run is a maximum over noisy evaluations, so its return is biased upwards;
 /// the same policies on fresh episodes are not. Personal policies compete by their mean over tasks
-/// (PP), meta-policies by theirs (MP).
+/// (PP), meta-policies by theirs (MP). "own_best" is what robots can do by themselves: each keeps
+/// its personal policy of the round in which it did best on its own task.
 class FreshEvaluation {
  public:
-  /// A round is complete: its summary, the agents as they are (training tasks first), and the
+  /// A round is complete: its record, the agents as they are (training tasks first), and the
   /// meta-policy it gave.
-  void offer(const RoundSummary& summary, const std::vector<TaskAgent>& agents,
+  void offer(const RoundBook::Round& round, const std::vector<TaskAgent>& agents,
              const MetaPolicy& meta);
 
   /// Every kept policy on at least `episodes` episodes a task. `cross`: personal policies on the
@@ -47,6 +49,7 @@ class FreshEvaluation {
     std::vector<Model> models;
   };
   Kept last_personal_, best_personal_, last_meta_, best_meta_;
+  std::vector<Kept> own_best_;  ///< by training task
 };
 
 }  // namespace pmeta
