@@ -149,6 +149,45 @@ TEST(ProximalAdam, WithoutLambdaItIsAdamAndTheAuxiliaryStays) {
   EXPECT_EQ(omega, before);
 }
 
+TEST(ProximalAdam, ARangeMayHaveALambdaOfItsOwn) {
+  const std::size_t n = 30;
+  ProximalAdamSettings settings;
+  settings.lambda = 20;
+  settings.eta = 0.01;
+  const std::vector<float> start = noise(n, 1), meta = noise(n, 2), gradient = noise(n, 3);
+  // what three optimisers with one lambda each do to their tens
+  std::vector<float> expected_phi, expected_omega;
+  const double lambdas[] = {5, 20, 0};
+  for (int part = 0; part < 3; ++part) {
+    settings.lambda = lambdas[part];
+    std::vector<float> phi(start.begin() + 10 * part, start.begin() + 10 * part + 10);
+    std::vector<float> omega(meta.begin() + 10 * part, meta.begin() + 10 * part + 10);
+    ProximalAdam alone(phi.data(), omega.data(), 10, settings);
+    alone.beginUpdate();
+    alone.apply(0, gradient.data() + 10 * part, 10);
+    expected_phi.insert(expected_phi.end(), phi.begin(), phi.end());
+    expected_omega.insert(expected_omega.end(), omega.begin(), omega.end());
+  }
+
+  settings.lambda = 20;
+  std::vector<float> phi = start, omega = meta;
+  ProximalAdam optimizer(phi.data(), omega.data(), n, settings);
+  optimizer.setLambda(0, 10, 5);
+  optimizer.setLambda(20, 10, 0);
+  optimizer.beginUpdate();
+  for (const std::size_t offset : {0, 10, 20}) {
+    optimizer.apply(offset, gradient.data() + offset, 10);
+  }
+  EXPECT_EQ(phi, expected_phi);
+  EXPECT_EQ(omega, expected_omega);
+  EXPECT_TRUE(std::equal(omega.begin() + 20, omega.end(), meta.begin() + 20));
+
+  EXPECT_THROW(optimizer.setLambda(15, 10, 1), Error) << "overlaps [20, 30)";
+  EXPECT_THROW(optimizer.setLambda(10, 21, 1), Error);
+  EXPECT_THROW(optimizer.setLambda(10, 5, -1), Error);
+  EXPECT_THROW(optimizer.apply(5, gradient.data(), 10), Error) << "over the edge";
+}
+
 TEST(ProximalAdam, BlocksInAnyOrderMakeOneUpdate) {
   ProximalAdamSettings settings;
   settings.lambda = 20;

@@ -5,6 +5,8 @@
 #include <filesystem>
 
 #include "../support.h"
+#include "pmeta_core/env/mountain_car.h"
+#include "pmeta_core/personal/dqn_personal_learner.h"
 
 namespace pmeta {
 namespace {
@@ -52,6 +54,27 @@ TEST(Experiment, IndependentIsSettings) {
   EXPECT_FALSE(e.evaluatesMeta());
   EXPECT_EQ(e.notes(), Notes{"algorithm independent sets personal.lambda to 0, "
                              "personal.personal_init to keep, aggregation.beta to 0."});
+}
+
+TEST(Experiment, PooledIsIndependentOnTheEnvironmentsOfAllTasks) {
+  const std::string cars =
+      "learner: dqn\nenvironment: {name: mountain_car, zeta: [3, 5]}\nalgorithm: pooled\n"
+      "dqn: {hidden: [4], num_envs: 4}\n";
+  const Experiment e = Experiment::parse(cars, "test");
+  EXPECT_FALSE(e.evaluatesMeta());
+  EXPECT_TRUE(e.keepsPersonal());
+  EXPECT_EQ(e.settings().aggregation.beta, 0);
+  const auto learner = e.makeLearner(0);
+  const auto& envs = dynamic_cast<DqnPersonalLearner&>(*learner).learner().envs();
+  ASSERT_EQ(envs.size(), 4u);
+  for (int k = 0; k < 4; ++k) {
+    EXPECT_EQ(dynamic_cast<MountainCar&>(*envs[k]).task().zeta, k % 2 == 0 ? 3 : 5);
+  }
+  EXPECT_EQ(
+      errorOf([&] { Experiment::parse(cars, "test", {"num_envs:=1"}); }),
+      "algorithm pooled needs at least one environment a task: set dqn.num_envs to 2 or more.");
+  EXPECT_EQ(refused({"algorithm:=pooled"}),
+            "algorithm pooled needs learner dqn, which trains in several environments.");
 }
 
 TEST(Experiment, UnstableStepSizesAreRefused) {

@@ -5,20 +5,27 @@
 namespace pmeta {
 namespace {
 
-std::vector<std::unique_ptr<Env>> copies(const std::function<std::unique_ptr<Env>()>& make_env,
-                                         int n) {
-  std::vector<std::unique_ptr<Env>> envs;
-  for (int i = 0; i < n; ++i) envs.push_back(make_env());
+using Environments = std::vector<std::unique_ptr<Env>>;
+
+Environments environments(const std::function<std::unique_ptr<Env>(int k)>& make, int n) {
+  Environments envs;
+  for (int k = 0; k < n; ++k) envs.push_back(make(k));
   return envs;
+}
+
+Environments copies(const std::function<std::unique_ptr<Env>()>& make_env, int n) {
+  return environments([&](int) { return make_env(); }, n);
 }
 
 }  // namespace
 
-DqnPersonalLearner::DqnPersonalLearner(const std::function<std::unique_ptr<Env>()>& make_env,
-                                       const DqnSettings& settings,
-                                       const ProximalAdamSettings& optimizer,
-                                       std::int64_t total_updates)
-    : learner_(copies(make_env, settings.num_envs), settings, total_updates),
+DqnPersonalLearner::DqnPersonalLearner(
+    const std::function<std::unique_ptr<Env>()>& make_env, const DqnSettings& settings,
+    const ProximalAdamSettings& optimizer, std::int64_t total_updates,
+    const std::function<std::unique_ptr<Env>(int k)>& make_training_env)
+    : learner_(make_training_env ? environments(make_training_env, settings.num_envs)
+                                 : copies(make_env, settings.num_envs),
+               settings, total_updates),
       layout_(Precision::kFloat32, learner_.network().blocks()),
       personal_(layout_),
       auxiliary_(layout_),

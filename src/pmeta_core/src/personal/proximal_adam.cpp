@@ -21,7 +21,7 @@ void require(bool holds, const char* name, double value, const char* range) {
 ProximalAdam::ProximalAdam(float* personal, float* auxiliary, std::size_t size,
                            const ProximalAdamSettings& settings)
     : personal_(personal),
-      auxiliary_(settings.lambda == 0 ? nullptr : auxiliary),
+      auxiliary_(auxiliary),
       settings_(settings),
       first_moment_(size),
       second_moment_(size) {
@@ -35,6 +35,28 @@ ProximalAdam::ProximalAdam(float* personal, float* auxiliary, std::size_t size,
   require(s.eta >= 0, "eta", s.eta, "at least 0");
 }
 
+void ProximalAdam::setLambda(std::size_t offset, std::size_t n, double lambda) {
+  require(lambda >= 0, "lambda", lambda, "at least 0");
+  const Range added{offset, offset + n, lambda};
+  bool fits = added.end <= size();
+  for (const Range& range : ranges_) {
+    fits = fits && (added.end <= range.begin || range.end <= added.begin);
+  }
+  if (!fits) throw Error("ranges of Adam's lambda must not overlap, nor pass the last parameter.");
+  ranges_.push_back(added);
+}
+
+double ProximalAdam::lambdaAt(std::size_t offset, std::size_t n) const {
+  for (const Range& range : ranges_) {
+    if (offset + n <= range.begin || range.end <= offset) continue;
+    if (offset < range.begin || range.end < offset + n) {
+      throw Error("one pass of Adam reaches over the edge of a range with a lambda of its own.");
+    }
+    return range.lambda;
+  }
+  return settings_.lambda;
+}
+
 void ProximalAdam::beginUpdate() { ++updates_; }
 
 void ProximalAdam::move(std::size_t offset, const float* gradient, std::size_t n, float* target,
@@ -43,6 +65,7 @@ void ProximalAdam::move(std::size_t offset, const float* gradient, std::size_t n
   require(target == nullptr || (tau > 0 && tau <= 1), "tau", tau, "in (0, 1]");
   const ProximalAdamSettings& s = settings_;
   const auto t = static_cast<double>(updates_);
+  const double lambda = lambdaAt(offset, n);
   AdamPass pass;
   pass.step_size = static_cast<float>(s.learning_rate / (1 - std::pow(s.beta1, t)));
   pass.beta1 = static_cast<float>(s.beta1);
@@ -51,13 +74,13 @@ void ProximalAdam::move(std::size_t offset, const float* gradient, std::size_t n
   pass.one_minus_beta2 = static_cast<float>(1 - s.beta2);
   pass.root_correction = static_cast<float>(1 / std::sqrt(1 - std::pow(s.beta2, t)));
   pass.eps = static_cast<float>(s.eps);
-  pass.pull = static_cast<float>(s.coupled ? s.lambda : s.alpha * s.lambda);
-  pass.follow = static_cast<float>(s.eta * s.lambda);
+  pass.pull = static_cast<float>(s.coupled ? lambda : s.alpha * lambda);
+  pass.follow = static_cast<float>(s.eta * lambda);
   pass.coupled = s.coupled;
   pass.tau = static_cast<float>(tau);
   kernels().adam(pass, personal_ + offset, first_moment_.data() + offset,
                  second_moment_.data() + offset, gradient,
-                 auxiliary_ == nullptr ? nullptr : auxiliary_ + offset, target, n);
+                 lambda == 0 || auxiliary_ == nullptr ? nullptr : auxiliary_ + offset, target, n);
 }
 
 void ProximalAdam::restore(std::uint64_t updates, const AlignedFloats& first_moment,

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -9,6 +10,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/personal/dqn_personal_learner.h"
@@ -98,7 +100,8 @@ void Experiment::bind(Settings& s) {
   ExperimentSettings& e = settings_;
   s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
   s.bind("preset", e.preset, "variant of the settings file; \"\" for none");
-  s.bind("algorithm", e.algorithm, "what is trained", {"pmeta", "model_averaging", "independent"});
+  s.bind("algorithm", e.algorithm, "what is trained",
+         {"pmeta", "model_averaging", "independent", "pooled"});
   s.bind("learner", e.learner,
          "q_learning for tables, dqn for networks, sac for networks with continuous actions",
          kLearners);
@@ -145,7 +148,14 @@ void Experiment::bindLearner(Settings& s) {
   s.bind("personal.proximal", e.personal.proximal,
          "the pull after Adam's step, or in the gradient that Adam gets", {"decoupled", "coupled"});
   if (e.learner == "dqn") pmeta::bind(s, "dqn.", e.dqn);
-  if (e.learner == "sac") pmeta::bind(s, "sac.", e.sac);
+  if (e.learner != "sac") return;
+  pmeta::bind(s, "sac.", e.sac);
+  const Range own = Range::atLeast(-1);
+  s.bind("personal.lambda_actor", e.personal.lambda_actor,
+         "the actor's own strength; -1: lambda; 0: the actor is neither reset nor shared", own);
+  s.bind("personal.lambda_critic", e.personal.lambda_critic, "the same for both critics", own);
+  s.bind("personal.lambda_encoder", e.personal.lambda_encoder, "the same for the inference network",
+         own);
 }
 
 Experiment Experiment::build(const YAML::Node& root, const std::string& source,
@@ -171,6 +181,10 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
                 " but there are " + std::to_string(experiment.numTasks()) +
                 " tasks: give at most that, or 0 for all.");
   }
+  const std::vector<int>& counts = e.sac.context.exploration_episodes;
+  if (std::adjacent_find(counts.begin(), counts.end(), std::greater_equal<int>()) != counts.end()) {
+    throw Error("sac.exploration_episodes must be ascending, e.g. [5, 15].");
+  }
   experiment.applyAlgorithm();
   experiment.checkStability();
   e.results_dir = expandResultsDir(e.results_dir);
@@ -194,13 +208,22 @@ std::string Experiment::describe(const std::string& environment, const std::stri
 void Experiment::applyAlgorithm() {
   ExperimentSettings& e = settings_;
   if (e.algorithm == "pmeta") return;
-  const std::string init = e.algorithm == "independent" ? "keep" : "meta";
+  if (e.algorithm == "pooled") {
+    if (e.learner != "dqn") {
+      throw Error("algorithm pooled needs learner dqn, which trains in several environments.");
+    }
+    if (e.dqn.num_envs < numTasks()) {
+      throw Error("algorithm pooled needs at least one environment a task: set dqn.num_envs to " +
+                  std::to_string(numTasks()) + " or more.");
+    }
+  }
+  const std::string init = evaluatesMeta() ? "meta" : "keep";
   std::vector<std::string> changes;
   if (e.personal.lambda != 0) changes.push_back("personal.lambda to 0");
   if (e.personal.personal_init != init) changes.push_back("personal.personal_init to " + init);
   e.personal.lambda = 0;
   e.personal.personal_init = init;
-  if (e.algorithm == "independent") {
+  if (!evaluatesMeta()) {
     if (e.aggregation.beta != 0) changes.push_back("aggregation.beta to 0");
     e.aggregation.beta = 0;
   }
@@ -210,6 +233,12 @@ void Experiment::applyAlgorithm() {
 
 void Experiment::checkStability() {
   const PersonalSettings& p = settings_.personal;
+  for (const double lambda : {p.lambda_actor, p.lambda_critic, p.lambda_encoder}) {
+    if (lambda < 0 && lambda != -1) {
+      throw Error("a lambda of a network's own is " + formatNumber(lambda) +
+                  " but must be at least 0, or -1 for that of all.");
+    }
+  }
   const bool tabular = settings_.learner == "q_learning";
   // with frozen auxiliary parameters the update is a linear map that blows up beyond these; of a
   // network only the pull is linear
@@ -265,10 +294,23 @@ std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
     optimizer.coupled = e.personal.proximal == "coupled";
     const auto make_env = [family = family_, task] { return family->make(task); };
     if (e.learner == "dqn") {
-      return std::make_unique<DqnPersonalLearner>(
-          make_env, e.dqn, optimizer, static_cast<std::int64_t>(e.rounds) * e.updates_per_round);
+      const auto updates = static_cast<std::int64_t>(e.rounds) * e.updates_per_round;
+      if (e.algorithm != "pooled") {
+        return std::make_unique<DqnPersonalLearner>(make_env, e.dqn, optimizer, updates);
+      }
+      const auto of_all_tasks = [family = family_](int k) {
+        return family->make(k % family->numTasks());
+      };
+      return std::make_unique<DqnPersonalLearner>(make_env, e.dqn, optimizer, updates,
+                                                  of_all_tasks);
     }
-    return std::make_unique<SacPersonalLearner>(make_env, e.sac, optimizer, task, numTasks());
+    const SacLambdas lambdas = {e.personal.lambda_actor, e.personal.lambda_critic,
+                                e.personal.lambda_encoder};
+    SacSettings sac = e.sac;
+    // nothing is learnt on a test task: no replay
+    if (isTestTask(task)) sac.buffer_size = sac.batch_size;
+    return std::make_unique<SacPersonalLearner>(
+        make_env, sac, optimizer, std::min(task, numTasks() - 1), numTasks(), lambdas);
   }
   std::unique_ptr<Env> env = family_->make(task);
   auto* tabular = dynamic_cast<TabularEnv*>(env.get());

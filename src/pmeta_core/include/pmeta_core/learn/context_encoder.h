@@ -22,11 +22,13 @@ struct ContextSettings {
   /// While training, every how-many-th episode acts on z from the prior. These, and the random
   /// steps of the warm-up, are the context: it then looks as at test time. 1: every episode.
   int prior_interval = 2;
-  int exploration_episodes = 2;    ///< at test time, before z is fixed
+  /// The meta-policy is evaluated before it has explored the task, and after so many episodes of
+  /// exploration; ascending.
+  std::vector<int> exploration_episodes = {2};
   bool exploration_noise = false;  ///< these act by samples instead of tanh(mean)
 };
 
-/// Binds all of them below `prefix`, e.g. "sac.context.".
+/// Binds all of them below `prefix`, e.g. "sac.".
 void bind(Settings& settings, const std::string& prefix, ContextSettings& context);
 
 /// q(z|c), a diagonal Gaussian; [latent_size] each.

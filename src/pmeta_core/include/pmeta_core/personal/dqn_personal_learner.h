@@ -20,10 +20,12 @@ namespace pmeta {
 class DqnPersonalLearner : public PersonalLearner {
  public:
   /// `make_env` gives new environments of the task. `total_updates`: of the whole run (C * R).
-  /// Throws Error where DqnLearner or ProximalAdam does.
+  /// `make_training_env`, if given, gives the k-th one to train in, of whatever task. Throws Error
+  /// where DqnLearner or ProximalAdam does.
   DqnPersonalLearner(const std::function<std::unique_ptr<Env>()>& make_env,
                      const DqnSettings& settings, const ProximalAdamSettings& optimizer,
-                     std::int64_t total_updates);
+                     std::int64_t total_updates,
+                     const std::function<std::unique_ptr<Env>(int k)>& make_training_env = {});
 
   const ModelLayout& layout() const override { return layout_; }
   Model initialModel(std::uint64_t seed) const override;

@@ -15,6 +15,11 @@ struct PersonalSettings {
 
   // networks only
   double learning_rate = 1e-3;  ///< Adam's
+  // soft actor-critic only: a strength for one kind of network; -1: `lambda`. At 0 those networks
+  // are each robot's own: neither reset nor shared
+  double lambda_actor = -1;
+  double lambda_critic = -1;
+  double lambda_encoder = -1;
   std::string proximal =
       "decoupled";  ///< the pull after Adam's step, or "coupled": in its gradient
 };

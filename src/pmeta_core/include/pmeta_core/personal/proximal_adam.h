@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "pmeta_core/learn/optimizer.h"
 #include "pmeta_core/nn/aligned.h"
@@ -38,6 +39,11 @@ class ProximalAdam : public Optimizer<float> {
   ProximalAdam(float* personal, float* auxiliary, std::size_t size,
                const ProximalAdamSettings& settings);
 
+  /// Pulls parameters [offset, offset + n) by a strength of their own; at 0 they are on their own,
+  /// and their auxiliary ones stay. An apply() must lie in one such range or touch none. Throws
+  /// Error on a negative strength, or a range that overlaps another or the end.
+  void setLambda(std::size_t offset, std::size_t n, double lambda);
+
   /// Counts one update. Call it once before the apply() calls that make up an update, in which each
   /// parameter has its turn once: Adam's bias correction goes by this count. apply() throws Error
   /// if no update has begun.
@@ -59,9 +65,17 @@ class ProximalAdam : public Optimizer<float> {
   void move(std::size_t offset, const float* gradient, std::size_t n, float* target,
             double tau) override;
 
+  struct Range {
+    std::size_t begin, end;
+    double lambda;
+  };
+
+  double lambdaAt(std::size_t offset, std::size_t n) const;
+
   float* personal_;
   float* auxiliary_;
   ProximalAdamSettings settings_;
+  std::vector<Range> ranges_;  // with a strength of their own
   std::uint64_t updates_ = 0;
   AlignedFloats first_moment_, second_moment_;
 };

@@ -27,7 +27,7 @@ struct AggregationSettings {
 struct ExperimentSettings {
   std::string experiment = "experiment";
   std::string preset;                  ///< which of the file's presets; "" for none
-  std::string algorithm = "pmeta";     ///< pmeta, model_averaging or independent
+  std::string algorithm = "pmeta";     ///< pmeta, model_averaging, independent or pooled
   std::string learner = "q_learning";  ///< q_learning (tables), dqn or sac (networks)
   std::int64_t seed = 0;
   int rounds = 10;            ///< C
@@ -51,10 +51,12 @@ struct ExperimentSettings {
 /// that one over the rest. What is read of a file depends on `learner` and `environment.name`:
 /// settings of others are unknown keys.
 ///
-/// The three algorithms are settings, not code paths of their own:
+/// The algorithms are settings, not code paths of their own:
 ///   pmeta            personal pull lambda, agents send auxiliary parameters
 ///   model_averaging  lambda = 0, agents send their personal parameters
 ///   independent      lambda = 0, personal parameters kept, beta = 0: nothing comes back
+///   pooled           independent, but each agent trains in environments of all tasks, as if
+///                    trajectories were shared (learner dqn); it is evaluated on its own task
 class Experiment {
  public:
   /// Reads a settings file and applies "key:=value" overrides. Throws Error.
@@ -72,7 +74,9 @@ class Experiment {
   bool isTestTask(int task) const { return task >= numTasks(); }
 
   bool sendsPersonal() const { return settings_.algorithm != "pmeta"; }
-  bool evaluatesMeta() const { return settings_.algorithm != "independent"; }
+  bool evaluatesMeta() const {
+    return settings_.algorithm == "pmeta" || settings_.algorithm == "model_averaging";
+  }
   bool keepsPersonal() const { return settings_.personal.personal_init == "keep"; }
   int quorum() const;  ///< updates needed once the deadline has passed
 

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <vector>
+
+#include "pmeta_core/env/env.h"
+#include "pmeta_core/learn/context_encoder.h"
+#include "pmeta_core/learn/sac_networks.h"
+
+namespace pmeta {
+
+/// What a policy knows of a task after some episodes of exploration.
+struct Adaptation {
+  int episodes = 0;           ///< 0: nothing
+  std::vector<float> latent;  ///< z to act with: the mean of q(z|c), at first the prior's, 0
+};
+
+/// Adapts to the task of `env` as at PEARL's test time: explores with z drawn from the prior in the
+/// first episode, and from the posterior of all transitions before in each later one. Gives what is
+/// known before exploring and after each of settings.exploration_episodes.
+///
+/// Episodes act by tanh(mean), or by samples of the policy with settings.exploration_noise.
+/// `parameters` (personal or meta) stay as they are. Throws Error if `networks` has no encoder.
+std::vector<Adaptation> adapt(const SacNetworks& networks, const ContextSettings& settings,
+                              const float* parameters, Env& env, Rng& rng);
+
+}  // namespace pmeta
