@@ -5,55 +5,21 @@
 #include <functional>
 
 #include "../support.h"
-#include "pmeta_core/base/csv_table.h"
+#include "pmeta_core/env/model_check.h"
+#include "recorded_file.h"
 
 namespace pmeta {
 namespace {
 
+using test::Altered;
 using test::errorOf;
+using test::Lines;
 using test::readFile;
 using test::TempDir;
 using test::writeFile;
 
 constexpr char kCartPole[] = PMETA_TEST_DATA "/cartpole_traj.csv.gz";
 constexpr char kMountainCar[] = PMETA_TEST_DATA "/mountaincar_traj.csv.gz";
-
-// the lines of a recorded file as cells; [0] is the header, so that line n of the file is [n - 1]
-using Lines = std::vector<std::vector<std::string>>;
-
-Lines linesOf(const std::string& path) {
-  const CsvTable table = CsvTable::load(path);
-  Lines lines = {table.columns()};
-  for (std::size_t row = 0; row < table.numRows(); ++row) {
-    lines.emplace_back();
-    for (std::size_t column = 0; column < table.columns().size(); ++column) {
-      lines.back().push_back(table.text(row, column));
-    }
-  }
-  return lines;
-}
-
-std::string textOf(const Lines& lines) {
-  std::string text;
-  for (const auto& cells : lines) text += join(cells, ",") + "\n";
-  return text;
-}
-
-// a recorded file with one change
-class Altered {
- public:
-  Altered(const std::string& path, const std::function<void(Lines&)>& change)
-      : path_(dir_ / "altered.csv") {
-    Lines lines = linesOf(path);
-    change(lines);
-    writeFile(path_, textOf(lines));
-  }
-  const std::string& path() const { return path_; }
-
- private:
-  TempDir dir_;
-  std::string path_;
-};
 
 TEST(TrajectoryCheck, CartPoleFollowsGym) {
   const TrajectoryReport report = checkTrajectories("cartpole", kCartPole);
@@ -216,7 +182,7 @@ TEST(TrajectoryCheck, BadFilesAreRefusedByLineAndColumn) {
 TEST(TrajectoryCheck, OtherKindsAndFilesAreRefused) {
   EXPECT_EQ(errorOf([] { checkTrajectories("cart_pole", kCartPole); }),
             "unknown trajectories 'cart_pole': did you mean 'cartpole'? Known are " +
-                join(trajectoryKinds()) + ".");
+                join(trajectoryKinds()) + ", " + join(modelKinds()) + ".");
   EXPECT_EQ(
       errorOf([] { checkTrajectories("cartpole", kMountainCar); }),
       std::string(kMountainCar) + " line 1 names no column 'x': is this the right kind of file?");

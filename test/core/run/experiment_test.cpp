@@ -127,7 +127,7 @@ TEST(Experiment, ValuesOutOfRangeAreRefused) {
             "rounds is '0' (given as rounds:=0) but must be a whole number, from 1 to 1e+06.");
   EXPECT_EQ(refused({"algorithm:=maml"}),
             "algorithm is 'maml' (given as algorithm:=maml) but must be one of pmeta, "
-            "model_averaging, independent.");
+            "model_averaging, independent, pooled.");
   EXPECT_EQ(refused({"quorum:=6"}),
             "aggregation.quorum is 6 but there are 5 tasks: give at most that, or 0 for all.");
 }

@@ -115,7 +115,8 @@ std::string listText(const std::vector<T>& values,
 template <class T>
 std::vector<T> readList(const std::string& key, const YAML::Node& node, const std::string& where,
                         const std::string& allowed,
-                        const std::function<bool(const YAML::Node&, T&)>& parse) {
+                        const std::function<bool(const YAML::Node&, T&)>& parse,
+                        Empty empty = Empty::kRefused) {
   std::vector<T> values;
   const auto take = [&](const YAML::Node& element) {
     T value{};
@@ -127,7 +128,7 @@ std::vector<T> readList(const std::string& key, const YAML::Node& node, const st
   } else {
     take(node);
   }
-  if (values.empty()) refuse(key, node, where, allowed);
+  if (values.empty() && empty == Empty::kRefused) refuse(key, node, where, allowed);
   return values;
 }
 
@@ -221,20 +222,23 @@ void Settings::bind(const std::string& key, std::string& value, const std::strin
 }
 
 void Settings::bind(const std::string& key, std::vector<int>& value, const std::string& doc,
-                    Range range) {
+                    Range range, Empty empty) {
   const std::string allowed = "a list of whole numbers" + rangeSuffix(range);
   add({key, doc, allowed, "",
        [=, &value](const YAML::Node& node, const std::string& where) {
-         value = readList<int>(key, node, where, allowed, [&](const YAML::Node& one, int& out) {
-           std::int64_t number = 0;
-           if (!parseInteger(one, number) || !range.contains(static_cast<double>(number)) ||
-               number < std::numeric_limits<int>::min() ||
-               number > std::numeric_limits<int>::max()) {
-             return false;
-           }
-           out = static_cast<int>(number);
-           return true;
-         });
+         value = readList<int>(
+             key, node, where, allowed,
+             [&](const YAML::Node& one, int& out) {
+               std::int64_t number = 0;
+               if (!parseInteger(one, number) || !range.contains(static_cast<double>(number)) ||
+                   number < std::numeric_limits<int>::min() ||
+                   number > std::numeric_limits<int>::max()) {
+                 return false;
+               }
+               out = static_cast<int>(number);
+               return true;
+             },
+             empty);
        },
        [&value] {
          return listText<int>(value, [](const int& one) { return std::to_string(one); });
@@ -242,14 +246,16 @@ void Settings::bind(const std::string& key, std::vector<int>& value, const std::
 }
 
 void Settings::bind(const std::string& key, std::vector<double>& value, const std::string& doc,
-                    Range range) {
+                    Range range, Empty empty) {
   const std::string allowed = "a list of numbers" + rangeSuffix(range);
   add({key, doc, allowed, "",
        [=, &value](const YAML::Node& node, const std::string& where) {
-         value =
-             readList<double>(key, node, where, allowed, [&](const YAML::Node& one, double& out) {
+         value = readList<double>(
+             key, node, where, allowed,
+             [&](const YAML::Node& one, double& out) {
                return parseNumber(one, out) && range.contains(out);
-             });
+             },
+             empty);
        },
        [&value] { return listText<double>(value, formatNumber); }});
 }

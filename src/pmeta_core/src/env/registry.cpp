@@ -2,10 +2,14 @@
 #include <map>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/env/ant.h"
 #include "pmeta_core/env/cart_pole.h"
 #include "pmeta_core/env/env.h"
 #include "pmeta_core/env/gridworld.h"
+#include "pmeta_core/env/half_cheetah.h"
 #include "pmeta_core/env/mountain_car.h"
+#include "pmeta_core/env/sparse_point.h"
+#include "pmeta_core/env/walker2d.h"
 
 namespace pmeta {
 namespace {
@@ -15,9 +19,14 @@ using Factory = std::function<std::unique_ptr<EnvFamily>()>;
 // every environment family of the suite; a new one adds its line here
 const std::map<std::string, Factory>& families() {
   static const std::map<std::string, Factory> kFamilies = {
+      {"ant_fwd_back", [] { return std::make_unique<AntFwdBackFamily>(); }},
       {"cart_pole", [] { return std::make_unique<CartPoleFamily>(); }},
       {"gridworld", [] { return std::make_unique<GridworldFamily>(); }},
+      {"half_cheetah_dir", [] { return std::make_unique<HalfCheetahDirFamily>(); }},
+      {"half_cheetah_vel", [] { return std::make_unique<HalfCheetahVelFamily>(); }},
       {"mountain_car", [] { return std::make_unique<MountainCarFamily>(); }},
+      {"sparse_point_robot", [] { return std::make_unique<SparsePointFamily>(); }},
+      {"walker_2d_params", [] { return std::make_unique<Walker2dParamsFamily>(); }},
   };
   return kFamilies;
 }

@@ -187,11 +187,15 @@ TrajectoryReport checkTrajectories(const std::string& kind, const std::string& p
 std::string trajectoryTable(const TrajectoryReport& report) {
   const bool beyond = report.unbounded_steps > 0;
   const std::size_t width = 24;
+  std::size_t name_width = 16;
+  for (const ColumnErrors& c : report.columns) {
+    name_width = std::max(name_width, c.column.size() + 2);
+  }
   std::string text = report.path + ": " + std::to_string(report.sequences) + " sequences, " +
                      std::to_string(report.steps) + " steps\nlargest error\n";
   const auto line = [&](const std::string& name, const std::string& single, const std::string& open,
                         const std::string& unbounded) {
-    text += "  " + padded(name, 16) + padded(single, width) +
+    text += "  " + padded(name, name_width) + padded(single, width) +
             (beyond ? padded(open, width) + unbounded : open) + "\n";
   };
   line("column", "single steps", "open loop",

@@ -29,7 +29,7 @@ ReturnStats Evaluation::run(const BatchPolicy& policy, Rng& rng) {
     for (std::size_t k = 0; k < running_.size(); ++k) {
       const std::size_t i = running_[k];
       const Step step = envs_[i]->step(&actions_[k * action_size_], rng, observation_.data());
-      returns_[i] += step.reward;
+      returns_[i] += step.evaluatedReward();
       if (step.terminated || step.truncated) continue;
       // close up: kept <= k, so nothing unread is overwritten
       running_[kept] = i;
@@ -68,7 +68,7 @@ Episode Evaluation::record(const BatchPolicy& policy, Rng& rng) {
     keep();
     episode.actions.insert(episode.actions.end(), actions_.begin(),
                            actions_.begin() + static_cast<std::ptrdiff_t>(action_size_));
-    episode.rewards.push_back(step.reward);
+    episode.rewards.push_back(step.evaluatedReward());
     episode.terminated = step.terminated;
     episode.truncated = step.truncated;
   }

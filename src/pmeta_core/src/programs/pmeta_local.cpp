@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/env/model_check.h"
 #include "pmeta_core/env/trajectory_check.h"
 #include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/run/local_runner.h"
@@ -39,8 +40,12 @@ constexpr char kUsage[] =
   check CONFIG [key:=value ...]        check the settings and print the effective ones as YAML
   settings [ENVIRONMENT]               list every setting with its meaning
   replay KIND FILE [--tasks FILE]      simulate recorded trajectories (CSV, also gzip) again and
-                                       compare. KIND: cartpole, mountaincar. The tasks are the
-                                       paper's unless a *_tasks.csv is given.
+                                       compare. KIND: ant, cartpole, half_cheetah, mountaincar,
+                                       sparse_point, walker2d, walker2d_params. The last and
+                                       sparse_point need the file of their tasks; of cartpole and
+                                       mountaincar they are the paper's unless one is given.
+                                       ant_model, half_cheetah_model, walker2d_model compare a file of
+                                       figures of the compiled model instead.
   evaluate POLICY_FILE [--episodes N] [--task I]
                                        returns of a trained policy (policies/*.safetensors of a run
                                        folder) on fresh episodes, at least N (100), of its own task,
@@ -224,7 +229,14 @@ int convergence(Arguments arguments) {
 int replay(const Arguments& arguments) {
   if (arguments.words.size() != 2) {
     throw Error("replay needs the kind of trajectories (" + pmeta::join(pmeta::trajectoryKinds()) +
+                ") or of a model (" + pmeta::join(pmeta::modelKinds()) +
                 ") and one file, e.g. replay cartpole cartpole_traj.csv.");
+  }
+  if (pmeta::isModelKind(arguments.words[0])) {
+    if (!arguments.tasks.empty()) throw Error("a model has no tasks: leave out --tasks.");
+    const pmeta::ModelReport report = pmeta::checkModel(arguments.words[0], arguments.words[1]);
+    std::cout << pmeta::modelTable(report) << std::flush;
+    return report.ok() ? 0 : 1;
   }
   const pmeta::TrajectoryReport report =
       pmeta::checkTrajectories(arguments.words[0], arguments.words[1], arguments.tasks);

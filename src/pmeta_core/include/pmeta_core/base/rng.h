@@ -7,12 +7,13 @@ namespace pmeta {
 
 /// What a random stream is for. Streams of one seed and task are independent of each other.
 enum class Stream : std::uint64_t {
-  kTaskDraw = 1,    ///< which tasks a family holds
-  kInitialise = 2,  ///< initial parameters
-  kCollect = 3,     ///< acting in the environment while training
-  kSample = 4,      ///< drawing training samples
-  kEvaluate = 5,    ///< evaluation episodes
-  kMeasure = 6,     ///< measurements on the side (theory, benchmarks)
+  kTaskDraw = 1,      ///< which tasks a family holds
+  kInitialise = 2,    ///< initial parameters
+  kCollect = 3,       ///< acting in the environment while training
+  kSample = 4,        ///< drawing training samples
+  kEvaluate = 5,      ///< evaluation episodes
+  kMeasure = 6,       ///< measurements on the side (theory, benchmarks)
+  kTestTaskDraw = 7,  ///< which tasks a family holds for test
 };
 
 /// Seeded generator xoshiro256++ (Blackman and Vigna, 2019), keyed by (seed, task, stream, round).

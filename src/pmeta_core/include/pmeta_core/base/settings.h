@@ -30,6 +30,9 @@ struct Range {
   std::string text() const;  ///< "at least 0", "from 0 to 1", "any"; for error messages
 };
 
+/// Whether a list may be empty.
+enum class Empty { kRefused, kAllowed };
+
 /// The settings of a program: typed variables bound to dotted keys ("personal.lambda").
 ///
 /// Each binding gives the key, the variable (which holds the default), its meaning and what is
@@ -45,11 +48,11 @@ class Settings {
   /// `choices`: the allowed words; empty means any text.
   void bind(const std::string& key, std::string& value, const std::string& doc,
             std::vector<std::string> choices = {});
-  /// Lists must not be empty; `range` holds for each element.
+  /// `range` holds for each element of a list.
   void bind(const std::string& key, std::vector<int>& value, const std::string& doc,
-            Range range = {});
+            Range range = {}, Empty empty = Empty::kRefused);
   void bind(const std::string& key, std::vector<double>& value, const std::string& doc,
-            Range range = {});
+            Range range = {}, Empty empty = Empty::kRefused);
   void bind(const std::string& key, std::vector<std::string>& value, const std::string& doc,
             std::vector<std::string> choices = {});
 

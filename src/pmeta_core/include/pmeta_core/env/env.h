@@ -24,10 +24,11 @@ struct Step {
   double reward = 0;
   bool terminated = false;  ///< a terminal state: nothing to bootstrap from
   bool truncated = false;   ///< the horizon was reached: the value of the state goes on
-  /// where training is on a denser reward than the task is about: the task's own, which evaluation
-  /// returns and contexts count
+  /// Where training is on a denser reward than the task is about: the task's own, which evaluation
+  /// returns and contexts count.
   std::optional<double> sparse_reward = std::nullopt;
 
+  /// The reward that a return is made of when a policy is judged.
   double evaluatedReward() const { return sparse_reward.value_or(reward); }
 };
 
@@ -68,10 +69,11 @@ class EnvFamily {
   /// Draws and checks the tasks; to be called once, after reading and before anything below.
   virtual void build(std::uint64_t seed) = 0;
 
+  /// Tasks 0 to numTasks() - 1 are for training.
   virtual int numTasks() const = 0;
 
-  /// Tasks that nobody trains on. Tasks 0..numTasks()-1 are for training, the numTestTasks() after
-  /// them for tests; taskName(), taskDescription() and make() take both.
+  /// Tasks numTasks() to numTasks() + numTestTasks() - 1 are test tasks, on which nobody trains.
+  /// taskName, taskDescription and make take both.
   virtual int numTestTasks() const { return 0; }
 
   /// A short name without blanks or commas, e.g. "grid_4x4".

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/env/env.h"
+#include "pmeta_core/env/mujoco_simulation.h"
+
+namespace pmeta {
+
+/// What the environments of MuJoCo share: actions from -1 to 1 (clipped), a torso, episodes that
+/// the horizon truncates. A step allocates nothing.
+class MujocoEnv : public Env {
+ public:
+  const EnvSpec& spec() const final { return spec_; }
+  void reset(Rng& rng, double* observation) final;
+  Step step(const double* action, Rng& rng, double* observation) final;
+
+  /// Configuration, velocity, the solver's warm start, position of the torso (as the last step left
+  /// it, see MujocoSimulation::bodyPosition), steps.
+  std::vector<double> state() const final;
+  void setState(const std::vector<double>& state) final;
+
+  const MujocoSimulation& simulation() const { return simulation_; }
+
+ protected:
+  MujocoEnv(const EnvSpec& spec, std::shared_ptr<const MujocoModel> model, int frame_skip);
+
+  /// The sum of the squares of the last step's control.
+  double squaredControl() const;
+
+  MujocoSimulation simulation_;
+  const double* torso_;  ///< its position, as the last step left it
+
+ private:
+  /// Draws a start: configuration and velocity hold the model's rest when this is called.
+  virtual void drawStart(Rng& rng, double* qpos, double* qvel) = 0;
+
+  /// What the reward needs of the state before a step.
+  virtual void beforeStep() = 0;
+
+  /// Reward and termination of the step that has just been made.
+  virtual Step afterStep() = 0;
+
+  virtual void observe(double* observation) const = 0;
+
+  EnvSpec spec_;
+  int torso_body_;
+  int steps_ = 0;
+};
+
+/// Settings of the families of such environments.
+struct MujocoSettings {
+  std::string model_file;  ///< "" for the shipped model
+  int horizon = 200;
+
+  void bind(Settings& settings);
+};
+
+}  // namespace pmeta

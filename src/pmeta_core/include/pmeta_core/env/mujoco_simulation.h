@@ -1,0 +1,90 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/env/mujoco_model.h"
+
+struct mjData_;
+
+namespace pmeta {
+
+/// One running simulation of a model, which others may share.
+///
+/// What MuJoCo would report as a warning (a state that is not finite or beyond 1e10, too many
+/// contacts) throws an Error that names the environment, the step and the quantity; after that,
+/// clear() or setState().
+class MujocoSimulation {
+ public:
+  /// `environment` is for errors; a step makes `frame_skip` of the model's timesteps.
+  MujocoSimulation(std::shared_ptr<const MujocoModel> model, std::string environment,
+                   int frame_skip);
+
+  const MujocoModel& model() const { return *model_; }
+  int nq() const { return nq_; }
+  int nv() const { return nv_; }
+  int nu() const { return nu_; }
+  int numBodies() const;             ///< the world included
+  double dt() const { return dt_; }  ///< seconds that a step takes
+
+  double* qpos() { return qpos_; }  ///< configuration, nq
+  const double* qpos() const { return qpos_; }
+  double* qvel() { return qvel_; }  ///< velocity, nv
+  const double* qvel() const { return qvel_; }
+  const double* control() const { return control_; }  ///< of the last step, clipped, nu
+
+  /// The origin of a body's frame (m), world axes; always at the same address. After a step it is
+  /// that of the last evaluation within the step, not of the configuration the step ended in:
+  /// MuJoCo does not evaluate once more, and neither does Gym.
+  const double* bodyPosition(int body) const;
+
+  /// Back to the model's rest configuration, at rest.
+  void clear();
+
+  /// Evaluates all that follows from the configuration and velocity, as a start needs. MuJoCo
+  /// normalises quaternions on the way.
+  void forward();
+
+  /// Steps with `action` (nu numbers, clipped to [-1, 1]); `step` is its number, for errors, which
+  /// also refuse an action that is not finite.
+  void step(const double* action, int step);
+
+  /// Works out contactForces() from the last step; changes nothing that later steps depend on.
+  void computeContactForces();
+
+  /// External contact torque and force on each body (N m, N), 6 numbers each, the world first.
+  const double* contactForces() const;
+
+  /// Length of state().
+  std::size_t stateSize() const;
+
+  /// Configuration, velocity, the solver's warm start and the position of body `tracked`: all that
+  /// a step and its environment depend on.
+  void appendState(int tracked, std::vector<double>& state) const;
+
+  /// Goes on from there.
+  void setState(int tracked, const double* state);
+
+ private:
+  void check(int step) const;
+  [[noreturn]] void refuse(int step, const std::string& what) const;
+  std::string jointOf(int index, const int* addresses) const;
+
+  struct Delete {
+    void operator()(mjData_* data) const;
+  };
+  std::shared_ptr<const MujocoModel> model_;
+  std::unique_ptr<mjData_, Delete> data_;
+  std::string environment_;
+  int frame_skip_;
+  int nq_;
+  int nv_;
+  int nu_;
+  double dt_;
+  double* qpos_;
+  double* qvel_;
+  double* control_;
+};
+
+}  // namespace pmeta

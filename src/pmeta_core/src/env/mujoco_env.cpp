@@ -1,0 +1,57 @@
+#include "pmeta_core/env/mujoco_env.h"
+
+namespace pmeta {
+
+MujocoEnv::MujocoEnv(const EnvSpec& spec, std::shared_ptr<const MujocoModel> model, int frame_skip)
+    : simulation_(std::move(model), spec.name, frame_skip),
+      spec_(spec),
+      torso_body_(simulation_.model().body("torso")) {
+  torso_ = simulation_.bodyPosition(torso_body_);
+}
+
+void MujocoEnv::reset(Rng& rng, double* observation) {
+  simulation_.clear();
+  drawStart(rng, simulation_.qpos(), simulation_.qvel());
+  simulation_.forward();
+  steps_ = 0;
+  observe(observation);
+}
+
+Step MujocoEnv::step(const double* action, Rng&, double* observation) {
+  beforeStep();
+  simulation_.step(action, steps_ + 1);
+  ++steps_;
+  Step step = afterStep();
+  step.truncated = !step.terminated && steps_ >= spec_.horizon;
+  observe(observation);
+  return step;
+}
+
+std::vector<double> MujocoEnv::state() const {
+  std::vector<double> state;
+  simulation_.appendState(torso_body_, state);
+  state.push_back(steps_);
+  return state;
+}
+
+void MujocoEnv::setState(const std::vector<double>& state) {
+  requireState(spec_, state, simulation_.stateSize() + 1);
+  simulation_.setState(torso_body_, state.data());
+  steps_ = static_cast<int>(state.back());
+}
+
+double MujocoEnv::squaredControl() const {
+  double sum = 0;
+  const double* control = simulation_.control();
+  for (int i = 0; i < simulation_.nu(); ++i) sum += control[i] * control[i];
+  return sum;
+}
+
+void MujocoSettings::bind(Settings& settings) {
+  settings.bind("environment.model_file", model_file,
+                "MJCF file with the full path; \"\" means the shipped model");
+  settings.bind("environment.horizon", horizon, "steps after which an episode is truncated",
+                Range::between(1, 1e6));
+}
+
+}  // namespace pmeta
