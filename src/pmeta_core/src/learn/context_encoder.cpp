@@ -28,17 +28,17 @@ MlpSpec encoderNetwork(std::size_t inputs, const ContextSettings& settings) {
 }  // namespace
 
 void bind(Settings& s, const std::string& prefix, ContextSettings& c) {
-  s.bind(prefix + "hidden", c.hidden, "units of each hidden layer of the context encoder",
+  s.bind(prefix + "context_hidden", c.hidden, "units of each hidden layer of the context encoder",
          Range::between(1, 65536));
   s.bind(prefix + "latent_size", c.latent_size, "length of the task vector z",
          Range::between(1, 1000));
-  s.bind(prefix + "batch_size", c.batch_size,
+  s.bind(prefix + "context_batch", c.batch_size,
          "context transitions of one update, and of one z to act with", Range::between(1, 1e6));
-  s.bind(prefix + "buffer_size", c.buffer_size, "recent context transitions kept",
+  s.bind(prefix + "context_buffer", c.buffer_size, "recent context transitions kept",
          Range::between(1, 1e9));
   s.bind(prefix + "kl_weight", c.kl_weight, "weight of the divergence of q(z|c) from the prior",
          Range::atLeast(0));
-  s.bind(prefix + "next_observation", c.next_observation,
+  s.bind(prefix + "context_next_observation", c.next_observation,
          "contexts hold next observations; for tasks that differ in dynamics");
   s.bind(prefix + "prior_interval", c.prior_interval,
          "every how-many-th training episode acts on z from the prior and becomes context",

@@ -20,7 +20,7 @@ void bind(Settings& s, const std::string& prefix, SacSettings& d) {
   s.bind(prefix + "task_encoding", d.task_encoding,
          "what tells the networks the task: inference (from recent transitions), one_hot or none",
          {"inference", "one_hot", "none"});
-  bind(s, prefix + "context.", d.context);
+  bind(s, prefix, d.context);
   s.bind(prefix + "evaluation_episodes", d.evaluation_episodes,
          "episodes of one evaluation, without exploration", Range::between(1, 100000));
   s.bind(prefix + "targets_at_round", d.targets_at_round,

@@ -26,7 +26,7 @@ struct ContextSettings {
   bool exploration_noise = false;  ///< these act by samples instead of tanh(mean)
 };
 
-/// Binds all of them below `prefix`, e.g. "sac.context.".
+/// Binds all of them below `prefix`, e.g. "sac.".
 void bind(Settings& settings, const std::string& prefix, ContextSettings& context);
 
 /// q(z|c), a diagonal Gaussian; [latent_size] each.

@@ -1,0 +1,129 @@
+#include "pmeta_core/personal/sac_personal_learner.h"
+
+#include <algorithm>
+
+#include "pmeta_core/learn/context_adaptation.h"
+
+namespace pmeta {
+namespace {
+
+std::vector<std::unique_ptr<Env>> copies(const std::function<std::unique_ptr<Env>()>& make_env,
+                                         int n) {
+  std::vector<std::unique_ptr<Env>> envs;
+  for (int i = 0; i < n; ++i) envs.push_back(make_env());
+  return envs;
+}
+
+std::vector<float> taskInputOf(const SacSettings& settings, int task, int num_tasks) {
+  return settings.task_encoding == "one_hot" ? oneHot(task, num_tasks) : std::vector<float>();
+}
+
+// zero parameters, of which the other tasks' one-hot columns are absent
+Model ownedModel(const ModelLayout& layout, const SacLearner& learner) {
+  Model model(layout);
+  const SacSettings& settings = learner.settings();
+  if (settings.task_encoding != "one_hot" || !settings.own_column) return model;
+  model.present.assign(layout.size(), 1);
+  const SacNetworks& networks = learner.networks();
+  const auto removeColumns = [&](std::size_t offset, const Mlp& mlp) {
+    // the first block is the first layer's weight, [outputs, inputs]
+    for (std::size_t o = 0; o < mlp.blocks().front().shape[0]; ++o) {
+      const std::size_t row = offset + o * mlp.inputs() + networks.observationSize();
+      for (std::size_t i = 0; i < networks.taskInputSize(); ++i) {
+        model.present[row + i] = learner.taskInput()[i] != 0;
+      }
+    }
+  };
+  removeColumns(0, networks.actor());
+  for (int k = 0; k < 2; ++k) removeColumns(networks.criticOffset(k), networks.critic(k));
+  return model;
+}
+
+}  // namespace
+
+SacPersonalLearner::SacPersonalLearner(const std::function<std::unique_ptr<Env>()>& make_env,
+                                       const SacSettings& settings,
+                                       const ProximalAdamSettings& optimizer, int task,
+                                       int num_tasks)
+    : learner_(make_env(), settings, taskInputOf(settings, task, num_tasks)),
+      layout_(Precision::kFloat32, learner_.networks().blocks()),
+      personal_(ownedModel(layout_, learner_)),
+      auxiliary_(personal_),
+      optimizer_(personal_.floats().data(), auxiliary_.floats().data(), layout_.size(), optimizer),
+      evaluation_(std::make_unique<Evaluation>(copies(make_env, settings.evaluation_episodes))),
+      evaluation_workspace_(std::make_unique<SacNetworks::ActorWorkspace>(
+          learner_.networks(), static_cast<std::size_t>(settings.evaluation_episodes))),
+      exploration_env_(learner_.networks().hasEncoder() ? make_env() : nullptr) {}
+
+Model SacPersonalLearner::initialModel(std::uint64_t seed) const {
+  // one start for all tasks
+  Rng rng(seed, 0, Stream::kInitialise);
+  Model model(layout_);
+  learner_.networks().initialise(model.floats().data(), rng);
+  return model;
+}
+
+void SacPersonalLearner::beginRound(const Model& meta, bool keep_personal) {
+  // copy in place: the optimiser holds the addresses
+  const std::vector<float>& values = meta.floats();
+  std::copy(values.begin(), values.end(), auxiliary_.floats().begin());
+  if (!keep_personal || !has_personal_) {
+    std::copy(values.begin(), values.end(), personal_.floats().begin());
+  }
+  const SacSettings& settings = learner_.settings();
+  if (!has_personal_ || settings.targets_at_round == "meta") learner_.resetTargets(values.data());
+  if (settings.reset_moments) {
+    const AlignedFloats zeros(layout_.size());
+    optimizer_.restore(0, zeros, zeros);
+  }
+  has_personal_ = true;
+}
+
+UpdateStats SacPersonalLearner::update(Rng& rng) {
+  const float* parameters = personal_.floats().data();
+  UpdateStats stats;
+  stats.env_steps = learner_.collect(parameters, rng);
+  optimizer_.beginUpdate();
+  stats.loss = learner_.update(parameters, optimizer_, rng).critic;
+  stats.updates = 1;
+  return stats;
+}
+
+std::vector<float> SacPersonalLearner::taskInput(const Model& policy) const {
+  if (!learner_.networks().hasEncoder()) return learner_.taskInput();
+  const LatentPosterior posterior = learner_.contextPosterior(policy.floats().data());
+  return {posterior.mean.begin(), posterior.mean.end()};
+}
+
+BatchPolicy SacPersonalLearner::greedy(const Model& policy,
+                                       const std::vector<float>& task_input) const {
+  return [this, &policy, &task_input](const float* observations, int batch, double* actions) {
+    learner_.networks().greedyActions(policy.floats().data(), observations,
+                                      static_cast<std::size_t>(batch), task_input.data(),
+                                      *evaluation_workspace_, actions);
+  };
+}
+
+ReturnStats SacPersonalLearner::evaluate(const Model& policy, Rng& rng) const {
+  const std::vector<float> task_input = taskInput(policy);
+  return evaluation_->run(greedy(policy, task_input), rng);
+}
+
+Episode SacPersonalLearner::record(const Model& policy, Rng& rng) const {
+  const std::vector<float> task_input = taskInput(policy);
+  return evaluation_->record(greedy(policy, task_input), rng);
+}
+
+AdaptedReturns SacPersonalLearner::evaluateAdapted(const Model& policy, Rng& rng) const {
+  Rng starts = rng, same_starts = rng;
+  const Adaptation adaptation = adapt(learner_.networks(), learner_.settings().context,
+                                      policy.floats().data(), *exploration_env_, rng);
+  AdaptedReturns returns;
+  returns.before = evaluation_->run(greedy(policy, adaptation.before), starts);
+  returns.after = evaluation_->run(greedy(policy, adaptation.after), same_starts);
+  returns.exploration = adaptation.returns;
+  returns.env_steps = adaptation.env_steps;
+  return returns;
+}
+
+}  // namespace pmeta
