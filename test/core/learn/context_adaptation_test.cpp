@@ -1,0 +1,208 @@
+#include "pmeta_core/learn/context_adaptation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "../support.h"
+#include "pmeta_core/learn/sac.h"
+#include "pmeta_core/personal/proximal_adam.h"
+
+namespace pmeta {
+namespace {
+
+// the reward is the action in the task's direction; the observation tells nothing of it
+class Direction : public Env {
+ public:
+  explicit Direction(double direction) : direction_(direction) {
+    spec_.name = "direction";
+    spec_.observation_size = 1;
+    spec_.action_size = 1;
+    spec_.horizon = 10;
+  }
+  const EnvSpec& spec() const override { return spec_; }
+  void reset(Rng& rng, double* observation) override {
+    t_ = 0;
+    observation[0] = start_ = rng.uniform();
+  }
+  Step step(const double* action, Rng&, double* observation) override {
+    actions.push_back(action[0]);
+    observation[0] = start_;
+    Step step{direction_ * action[0], false, ++t_ == spec_.horizon};
+    if (sparse) step.sparse_reward = 7;
+    return step;
+  }
+  std::vector<double> actions;  // all that were taken
+  bool sparse = false;
+
+ private:
+  EnvSpec spec_;
+  double direction_;
+  double start_ = 0;
+  int t_ = 0;
+};
+
+SacSettings smallSettings() {
+  SacSettings settings;
+  settings.hidden = {24, 24};
+  settings.batch_size = 32;
+  settings.warm_up_steps = 100;
+  settings.gamma = 0.5;
+  settings.task_encoding = "inference";
+  settings.context.hidden = {16, 16};
+  settings.context.latent_size = 2;
+  settings.context.batch_size = 20;
+  settings.context.buffer_size = 200;
+  settings.context.exploration_episodes = {1, 3};
+  return settings;
+}
+
+struct Untrained {
+  Untrained() : networks(Direction(1).spec(), smallSettings(), 0), parameters(networks.size()) {
+    Rng rng(1, 0, Stream::kInitialise);
+    networks.initialise(parameters.data(), rng);
+  }
+  std::vector<Adaptation> adaptTo(Env& env, const ContextSettings& settings, std::uint64_t seed = 0) const {
+    Rng rng(seed, 0, Stream::kEvaluate);
+    return adapt(networks, settings, parameters.data(), env, rng);
+  }
+  SacNetworks networks;
+  AlignedFloats parameters;
+};
+
+TEST(Adapt, ActsOnTheMeanOfThePosteriorOfAllTransitions) {
+  const Untrained sac;
+  const ContextSettings settings = smallSettings().context;
+  Direction env(-1);
+  const std::vector<Adaptation> found = sac.adaptTo(env, settings);
+  ASSERT_EQ(found.size(), 3u);
+  EXPECT_EQ(found[0].episodes, 0);
+  EXPECT_EQ(found[0].latent, (std::vector<float>{0, 0}));
+  EXPECT_EQ(found[1].episodes, 1);
+  EXPECT_EQ(found[2].episodes, 3);
+  EXPECT_EQ(env.actions.size(), 30u);
+
+  // rows (s, a, r) again: starts and actions follow from the same generator
+  Rng rng(0, 0, Stream::kEvaluate);
+  std::vector<float> rows;
+  const ContextEncoder& encoder = sac.networks.encoder();
+  ContextEncoder::Workspace workspace(encoder, 30);
+  LatentPosterior posterior;
+  const auto infer = [&] {
+    encoder.infer(sac.parameters.data() + sac.networks.encoderOffset(), rows.data(),
+                  rows.size() / 3, workspace, posterior);
+  };
+  for (int episode = 0; episode < 3; ++episode) {
+    infer();  // of all episodes before; first the prior
+    for (int j = 0; j < 2; ++j) rng.normal();
+    const auto start = static_cast<float>(rng.uniform());
+    for (int t = 0; t < 10; ++t) {
+      const double action = env.actions[static_cast<std::size_t>(10 * episode + t)];
+      rows.insert(rows.end(), {start, static_cast<float>(action), static_cast<float>(-action)});
+    }
+    if (episode == 1) continue;
+    infer();
+    for (std::size_t j = 0; j < 2; ++j) {
+      EXPECT_NEAR(found[episode == 0 ? 1 : 2].latent[j], posterior.mean[j], 1e-6);
+    }
+  }
+}
+
+TEST(Adapt, ActsByTheMeanUnlessNoiseIsWanted) {
+  const Untrained sac;
+  ContextSettings settings = smallSettings().context;
+  for (const bool noise : {false, true}) {
+    settings.exploration_noise = noise;
+    Direction env(1);
+    sac.adaptTo(env, settings);
+    // observation and z stay within an episode, so the mean does
+    EXPECT_EQ(env.actions[0] == env.actions[1], !noise);
+    EXPECT_NE(env.actions[0], env.actions[10]) << "each episode has a z of its own";
+  }
+}
+
+TEST(Adapt, CountsTheRewardThatMatters) {
+  const Untrained sac;
+  Direction dense(1), sparse(1);
+  sparse.sparse = true;
+  const ContextSettings settings = smallSettings().context;
+  EXPECT_NE(sac.adaptTo(dense, settings).back().latent, sac.adaptTo(sparse, settings).back().latent);
+}
+
+TEST(Adapt, RefusesNetworksWithoutAnEncoder) {
+  SacSettings settings = smallSettings();
+  settings.task_encoding = "none";
+  const SacNetworks networks(Direction(1).spec(), settings, 0);
+  const AlignedFloats parameters(networks.size());
+  Direction env(1);
+  Rng rng(0, 0, Stream::kEvaluate);
+  EXPECT_EQ(test::errorOf([&] { adapt(networks, settings.context, parameters.data(), env, rng); }),
+            "adapting to a task needs the context encoder: set task_encoding to inference.");
+}
+
+// undiscounted return of one episode by tanh(mean) with that z
+double returnWith(const SacNetworks& networks, const float* parameters, Env& env,
+                  const std::vector<float>& z) {
+  SacNetworks::ActorWorkspace workspace(networks, 1);
+  Rng rng(9, 0, Stream::kEvaluate);
+  double observation = 0, action = 0, sum = 0;
+  Step step;
+  env.reset(rng, &observation);
+  while (!step.truncated) {
+    const auto seen = static_cast<float>(observation);
+    networks.greedyActions(parameters, &seen, 1, z.data(), workspace, &action);
+    step = env.step(&action, rng, &observation);
+    sum += step.reward;
+  }
+  return sum;
+}
+
+TEST(Adapt, EncoderTellsTwoOppositeTasksApart) {
+  // one set of parameters for both directions; only z can tell which
+  const double directions[] = {1, -1};
+  std::vector<std::unique_ptr<SacLearner>> learners;
+  for (const double direction : directions) {
+    learners.push_back(
+        std::make_unique<SacLearner>(std::make_unique<Direction>(direction), smallSettings()));
+  }
+  const SacNetworks& networks = learners[0]->networks();
+  AlignedFloats parameters(networks.size());
+  Rng initial(0, 0, Stream::kInitialise);
+  networks.initialise(parameters.data(), initial);
+  ProximalAdamSettings adam;
+  adam.learning_rate = 3e-3;
+  ProximalAdam optimizer(parameters.data(), nullptr, parameters.size(), adam);
+  std::vector<Rng> rngs = {Rng(0, 0, Stream::kSample), Rng(0, 1, Stream::kSample)};
+  for (const auto& learner : learners) learner->resetTargets(parameters.data());
+  for (int i = 0; i < 1500; ++i) {
+    for (std::size_t task = 0; task < 2; ++task) {
+      learners[task]->collect(parameters.data(), rngs[task]);
+      optimizer.beginUpdate();
+      learners[task]->update(parameters.data(), optimizer, rngs[task]);
+    }
+  }
+  for (std::size_t task = 0; task < 2; ++task) {
+    Direction env(directions[task]);
+    Rng rng(4, task, Stream::kEvaluate);
+    const std::vector<Adaptation> known =
+        adapt(networks, smallSettings().context, parameters.data(), env, rng);
+    EXPECT_GT(returnWith(networks, parameters.data(), env, known.back().latent), 7)
+        << "of 10 in direction " << directions[task];
+    const LatentPosterior own = learners[task]->contextPosterior(parameters.data());
+    EXPECT_GT(returnWith(networks, parameters.data(), env, {own.mean.begin(), own.mean.end()}), 7);
+    const LatentPosterior other = learners[1 - task]->contextPosterior(parameters.data());
+    EXPECT_LT(returnWith(networks, parameters.data(), env, {other.mean.begin(), other.mean.end()}),
+              -7);
+    double distance = 0, deviation = 0;
+    for (std::size_t j = 0; j < own.mean.size(); ++j) {
+      distance += std::pow(own.mean[j] - other.mean[j], 2);
+      deviation += own.variance[j] + other.variance[j];
+    }
+    EXPECT_GT(distance, 16 * deviation);
+  }
+}
+
+}  // namespace
+}  // namespace pmeta

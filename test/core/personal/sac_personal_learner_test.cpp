@@ -1,0 +1,378 @@
+#include "pmeta_core/personal/sac_personal_learner.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "../allocations.h"
+#include "../support.h"
+#include "pmeta_core/aggregate/mix.h"
+
+namespace pmeta {
+namespace {
+
+// a point on a line with a goal of its own
+class Goal : public Env {
+ public:
+  explicit Goal(double goal) : goal_(goal) {
+    spec_.name = "goal";
+    spec_.observation_size = 2;
+    spec_.action_size = 1;
+    spec_.horizon = 10;
+  }
+  const EnvSpec& spec() const override { return spec_; }
+  void reset(Rng& rng, double* observation) override {
+    x_ = 2 * rng.uniform() - 1;
+    t_ = 0;
+    observe(observation);
+  }
+  Step step(const double* action, Rng&, double* observation) override {
+    x_ += 0.3 * action[0];
+    ++t_;
+    observe(observation);
+    return {-std::abs(x_ - goal_), false, t_ == spec_.horizon};
+  }
+
+ private:
+  void observe(double* observation) const {
+    observation[0] = x_;
+    observation[1] = 0.1 * t_;
+  }
+  EnvSpec spec_;
+  double goal_;
+  double x_ = 0;
+  int t_ = 0;
+};
+
+constexpr int kTasks = 3;
+
+SacSettings smallSettings(const std::string& task_encoding = "one_hot") {
+  SacSettings settings;
+  settings.hidden = {8, 6};
+  settings.batch_size = 16;
+  settings.buffer_size = 200;
+  settings.warm_up_steps = 30;
+  settings.task_encoding = task_encoding;
+  settings.context.hidden = {7, 5};
+  settings.context.latent_size = 2;
+  settings.context.batch_size = 10;
+  settings.context.buffer_size = 50;
+  settings.evaluation_episodes = 4;
+  return settings;
+}
+
+ProximalAdamSettings pulled() {
+  ProximalAdamSettings settings;
+  settings.lambda = 15;
+  settings.eta = 1e-2;
+  return settings;
+}
+
+SacPersonalLearner makeLearner(const SacSettings& settings = smallSettings(), int task = 1) {
+  return SacPersonalLearner([task] { return std::make_unique<Goal>(task - 1); }, settings, pulled(),
+                            task, kTasks);
+}
+
+void run(SacPersonalLearner& learner, int updates, Rng& rng) {
+  for (int r = 0; r < updates; ++r) learner.update(rng);
+}
+
+TEST(SacPersonalLearner, LayoutNamesEveryNetwork) {
+  EXPECT_EQ(makeLearner().layout().text(),
+            "float32\n"
+            "actor.layer0.weight 8 5\nactor.layer0.bias 8\nactor.layer1.weight 6 8\n"
+            "actor.layer1.bias 6\nactor.layer2.weight 2 6\nactor.layer2.bias 2\n"
+            "critic1.layer0.weight 8 6\ncritic1.layer0.bias 8\ncritic1.layer1.weight 6 8\n"
+            "critic1.layer1.bias 6\ncritic1.layer2.weight 1 6\ncritic1.layer2.bias 1\n"
+            "critic2.layer0.weight 8 6\ncritic2.layer0.bias 8\ncritic2.layer1.weight 6 8\n"
+            "critic2.layer1.bias 6\ncritic2.layer2.weight 1 6\ncritic2.layer2.bias 1\n");
+  const std::string text = makeLearner(smallSettings("inference")).layout().text();
+  EXPECT_NE(text.find("actor.layer0.weight 8 4\n"), std::string::npos);
+  EXPECT_NE(text.find("encoder.layer0.weight 7 4\n"), std::string::npos);
+  EXPECT_NE(text.find("encoder.layer2.weight 4 5\n"), std::string::npos);
+}
+
+TEST(SacPersonalLearner, UpdatesAreTheLearnersByAdamWithPull) {
+  auto learner = makeLearner();
+  const Model meta = learner.initialModel(1);
+  SacLearner plain(std::make_unique<Goal>(0), smallSettings(), oneHot(1, kTasks));
+  std::vector<float> phi = meta.floats(), omega = phi;
+  ProximalAdam adam(phi.data(), omega.data(), phi.size(), pulled());
+  plain.resetTargets(phi.data());
+  learner.beginRound(meta, false);
+  Rng rng(5, 0, Stream::kSample), same = rng;
+  for (int r = 0; r < 30; ++r) {
+    const UpdateStats stats = learner.update(rng);
+    EXPECT_EQ(stats.env_steps, plain.collect(phi.data(), same));
+    adam.beginUpdate();
+    EXPECT_EQ(stats.loss, plain.update(phi.data(), adam, same).critic);
+    EXPECT_EQ(stats.updates, 1);
+  }
+  EXPECT_EQ(learner.personal().floats(), phi);
+  EXPECT_EQ(learner.auxiliary().floats(), omega);
+  EXPECT_NE(phi, omega);
+  EXPECT_NE(omega, meta.floats());
+}
+
+TEST(SacPersonalLearner, RoundResetsParametersAndNothingElse) {
+  auto learner = makeLearner(smallSettings("inference"));
+  Rng rng(1, 0, Stream::kSample);
+  learner.beginRound(learner.initialModel(1), false);
+  const SacNetworks& networks = learner.learner().networks();
+  EXPECT_TRUE(std::equal(
+      learner.learner().targets().begin(), learner.learner().targets().end(),
+      learner.personal().floats().begin() + static_cast<std::ptrdiff_t>(networks.criticOffset(0))))
+      << "the first targets are the first meta-policy's critics";
+  run(learner, 20, rng);
+  const AlignedFloats targets = learner.learner().targets();
+  const AlignedFloats first = learner.optimizer().firstMoment();
+  const double temperature = learner.learner().temperature().value();
+  const std::vector<float> replay = learner.learner().replay().values();
+  const std::vector<float> context = learner.learner().context().values();
+  const std::vector<float> kept = learner.personal().floats();
+
+  const Model meta = learner.initialModel(2);
+  learner.beginRound(meta, true);
+  EXPECT_EQ(learner.personal().floats(), kept);
+  EXPECT_EQ(learner.auxiliary().floats(), meta.floats());
+  learner.beginRound(meta, false);
+  EXPECT_EQ(learner.personal().floats(), meta.floats());
+  EXPECT_EQ(learner.learner().targets(), targets);
+  EXPECT_EQ(learner.optimizer().firstMoment(), first);
+  EXPECT_EQ(learner.optimizer().updates(), 20u);
+  EXPECT_EQ(learner.learner().temperature().value(), temperature);
+  EXPECT_EQ(learner.learner().replay().values(), replay);
+  EXPECT_EQ(learner.learner().context().values(), context);
+}
+
+TEST(SacPersonalLearner, TargetsAndMomentsBeginAnewWhereSettingsSaySo) {
+  SacSettings settings = smallSettings();
+  settings.targets_at_round = "meta";
+  settings.reset_moments = true;
+  auto learner = makeLearner(settings);
+  Rng rng(1, 0, Stream::kSample);
+  learner.beginRound(learner.initialModel(1), false);
+  run(learner, 20, rng);
+  const Model meta = learner.initialModel(2);
+  learner.beginRound(meta, true);
+  const std::size_t offset = learner.learner().networks().criticOffset(0);
+  for (std::size_t k = 0; k < learner.learner().targets().size(); ++k) {
+    ASSERT_EQ(learner.learner().targets()[k], meta.floats()[offset + k]);
+  }
+  EXPECT_EQ(learner.optimizer().updates(), 0u);
+  EXPECT_EQ(learner.optimizer().firstMoment(), AlignedFloats(meta.size()));
+}
+
+TEST(SacPersonalLearner, OwnColumnIsAggregatedFromItsTaskAlone) {
+  std::vector<Model> sent;
+  Model meta;
+  for (int task = 0; task < kTasks; ++task) {
+    auto learner = makeLearner(smallSettings(), task);
+    meta = learner.initialModel(1);
+    learner.beginRound(meta, false);
+    Rng rng(1, static_cast<std::uint64_t>(task), Stream::kSample);
+    run(learner, 20, rng);
+    sent.push_back(learner.personal());
+    EXPECT_EQ(learner.auxiliary().present, sent.back().present);
+  }
+  const Model before = meta;
+  std::vector<Contribution> contributions;
+  for (const Model& model : sent) contributions.push_back({&model, 1.0});
+  mixInto(meta, contributions, 1);
+
+  // owner of each parameter, from the blocks' names and shapes
+  std::size_t k = 0, owned = 0;
+  for (const Block& block : meta.layout.blocks()) {
+    const bool first_layer = block.name.find("layer0.weight") != std::string::npos;
+    for (std::size_t j = 0; j < block.size(); ++j, ++k) {
+      const std::size_t column = first_layer ? j % block.shape[1] : 0;
+      const bool one_hot = first_layer && column >= 2 && column < 2 + kTasks;
+      double expected = 0;
+      for (std::size_t task = 0; task < kTasks; ++task) {
+        EXPECT_EQ(sent[task].isPresent(k), !one_hot || column == 2 + task);
+        expected += sent[task].floats()[k] / kTasks;
+      }
+      if (one_hot) {
+        expected = sent[column - 2].floats()[k];
+        for (std::size_t task = 0; task < kTasks; ++task) {
+          if (task != column - 2) {
+            EXPECT_EQ(sent[task].floats()[k], before.floats()[k]) << "no gradient reaches it";
+          }
+        }
+      }
+      owned += one_hot;
+      ASSERT_NEAR(meta.floats()[k], expected, 1e-6) << block.name;
+    }
+  }
+  EXPECT_EQ(owned, 3u * 8 * kTasks);
+}
+
+TEST(SacPersonalLearner, EverythingIsPresentWithoutOwnColumns) {
+  SacSettings settings = smallSettings();
+  settings.own_column = false;
+  EXPECT_TRUE(makeLearner(settings).personal().present.empty());
+  EXPECT_TRUE(makeLearner(smallSettings("inference")).personal().present.empty());
+  EXPECT_TRUE(makeLearner(smallSettings("none")).personal().present.empty());
+}
+
+TEST(SacPersonalLearner, OneSeedOneResultWhateverIsEvaluated) {
+  for (const char* encoding : {"one_hot", "inference"}) {
+    auto a = makeLearner(smallSettings(encoding)), b = makeLearner(smallSettings(encoding)),
+         other = makeLearner(smallSettings(encoding));
+    const Model meta = a.initialModel(1);
+    for (int round = 1; round <= 3; ++round) {
+      for (SacPersonalLearner* learner : {&a, &b, &other}) {
+        learner->beginRound(meta, false);
+        Rng rng(learner == &other ? 8 : 7, 0, Stream::kSample, round);
+        run(*learner, 20, rng);
+        if (learner == &b) continue;
+        Rng evaluation(7, 0, Stream::kEvaluate);
+        learner->evaluate(learner->personal(), evaluation);
+        learner->record(meta, evaluation);
+        if (learner->learner().networks().hasEncoder()) learner->evaluateAdapted(meta, evaluation);
+      }
+    }
+    EXPECT_EQ(a.personal().checksum(), b.personal().checksum());
+    EXPECT_EQ(a.auxiliary().checksum(), b.auxiliary().checksum());
+    EXPECT_NE(a.personal().checksum(), other.personal().checksum());
+  }
+}
+
+TEST(SacPersonalLearner, EvaluatesWithTheMeanOfItsOwnContext) {
+  auto learner = makeLearner(smallSettings("inference"));
+  learner.beginRound(learner.initialModel(1), false);
+  Rng rng(1, 0, Stream::kSample);
+  run(learner, 20, rng);
+  Rng starts(2, 0, Stream::kEvaluate);
+  const Episode episode = learner.record(learner.personal(), starts);
+  const float* parameters = learner.personal().floats().data();
+  const LatentPosterior posterior = learner.learner().contextPosterior(parameters);
+  const std::vector<float> z(posterior.mean.begin(), posterior.mean.end());
+  const SacNetworks& networks = learner.learner().networks();
+  SacNetworks::ActorWorkspace workspace(networks, 1);
+  ASSERT_EQ(episode.actions.size(), 10u);
+  for (std::size_t t = 0; t < episode.actions.size(); ++t) {
+    const std::vector<float> seen(&episode.observations[2 * t], &episode.observations[2 * t] + 2);
+    double action = 0;
+    networks.greedyActions(parameters, seen.data(), 1, z.data(), workspace, &action);
+    EXPECT_EQ(episode.actions[t], action);
+  }
+}
+
+TEST(SacPersonalLearner, AdaptedReturnsCompareLikeWithLike) {
+  auto learner = makeLearner(smallSettings("inference"));
+  Model policy = learner.initialModel(1);
+  Rng rng(3, 0, Stream::kEvaluate), same = rng;
+  const std::vector<AdaptedReturn> returns = learner.evaluateAdapted(policy, rng);
+  ASSERT_EQ(returns.size(), 2u);
+  EXPECT_EQ(returns[0].context_episodes, 0);
+  EXPECT_EQ(returns[1].context_episodes, 2);
+  EXPECT_EQ(returns[0].stats.episodes, 4);
+  EXPECT_NE(returns[0].stats.mean, returns[1].stats.mean);
+  // nothing was collected, so evaluate() has the prior's mean for z
+  EXPECT_EQ(learner.evaluate(policy, same).mean, returns[0].stats.mean);
+  // an actor blind to z gains nothing: the starts are the same
+  const Mlp& actor = learner.learner().networks().actor();
+  for (std::size_t o = 0; o < 8; ++o) {
+    for (std::size_t i = 2; i < 4; ++i) policy.floats()[o * actor.inputs() + i] = 0;
+  }
+  const std::vector<AdaptedReturn> blind = learner.evaluateAdapted(policy, rng);
+  EXPECT_EQ(blind[0].stats.mean, blind[1].stats.mean);
+}
+
+TEST(SacPersonalLearner, WithoutAnEncoderThereIsNothingToAdapt) {
+  const auto learner = makeLearner();
+  Rng rng(3, 0, Stream::kEvaluate), same = rng;
+  const std::vector<AdaptedReturn> returns = learner.evaluateAdapted(learner.initialModel(1), rng);
+  ASSERT_EQ(returns.size(), 1u);
+  EXPECT_EQ(returns[0].context_episodes, 0);
+  EXPECT_EQ(returns[0].stats.mean, learner.evaluate(learner.initialModel(1), same).mean);
+}
+
+TEST(SacPersonalLearner, NetworksWithLambdaZeroAreEachRobotsOwn) {
+  const SacSettings settings = smallSettings();
+  ProximalAdamSettings adam;
+  adam.lambda = 10;
+  SacLambdas lambdas;
+  lambdas.critic = 0;
+  SacPersonalLearner learner([] { return std::make_unique<PointMass>(); }, settings, adam, 0, 3,
+                             lambdas);
+  Rng rng(1, 0, Stream::kSample);
+  const Model meta = learner.initialModel(1);
+  learner.beginRound(meta, false);
+  run(learner, 20, rng);
+  const std::vector<float> trained = learner.personal().floats();
+  const std::size_t critics = learner.learner().networks().criticOffset(0);
+  EXPECT_TRUE(std::equal(meta.floats().begin() + critics, meta.floats().end(),
+                         learner.auxiliary().floats().begin() + critics));
+  EXPECT_FALSE(std::equal(meta.floats().begin(), meta.floats().begin() + critics,
+                          learner.auxiliary().floats().begin()));
+  learner.beginRound(meta, false);
+  EXPECT_TRUE(std::equal(meta.floats().begin(), meta.floats().begin() + critics,
+                         learner.personal().floats().begin()));
+  EXPECT_TRUE(std::equal(trained.begin() + critics, trained.end(),
+                         learner.personal().floats().begin() + critics));
+}
+
+TEST(SacPersonalLearner, UpdatesAllocateNothing) {
+  for (const char* encoding : {"one_hot", "inference"}) {
+    auto learner = makeLearner(smallSettings(encoding));
+    Rng rng(1, 0, Stream::kSample);
+    learner.beginRound(learner.initialModel(1), false);
+    run(learner, 1, rng);
+    const std::size_t before = test::allocations();
+    run(learner, 300, rng);
+    EXPECT_EQ(test::allocations() - before, 0u);
+  }
+}
+
+TEST(SacPersonalLearner, RefusesATaskThatIsNone) {
+  EXPECT_EQ(test::errorOf([] { makeLearner(smallSettings(), 3); }), "task 3 is none of 3.");
+}
+
+// personal and meta-policy of three goals that conflict, told apart by a one-hot vector
+TEST(SacPersonalLearner, RoundsGiveOneMetaPolicyForAllGoals) {
+  SacSettings settings;
+  settings.hidden = {32, 32};
+  settings.batch_size = 32;
+  settings.warm_up_steps = 200;
+  settings.gamma = 0.9;
+  std::vector<std::unique_ptr<SacPersonalLearner>> learners;
+  for (int task = 0; task < kTasks; ++task) {
+    ProximalAdamSettings adam = pulled();
+    adam.learning_rate = 3e-3;
+    learners.push_back(std::make_unique<SacPersonalLearner>(
+        [task] { return std::make_unique<Goal>(task - 1); }, settings, adam, task, kTasks));
+  }
+  Model meta = learners[0]->initialModel(0);
+  const auto meanReturn = [&](bool personal) {
+    double sum = 0;
+    for (const auto& learner : learners) {
+      Rng rng(1, 0, Stream::kEvaluate);
+      sum += learner->evaluate(personal ? learner->personal() : meta, rng).mean / kTasks;
+    }
+    return sum;
+  };
+  const double untrained = meanReturn(false);
+  for (std::uint64_t round = 0; round < 30; ++round) {
+    std::vector<Contribution> contributions;
+    for (std::size_t task = 0; task < learners.size(); ++task) {
+      learners[task]->beginRound(meta, false);
+      Rng rng(0, task, Stream::kSample, round);
+      run(*learners[task], 50, rng);
+      contributions.push_back({&learners[task]->auxiliary(), 1.0});
+    }
+    if (round + 1 == 30) {
+      EXPECT_GT(meanReturn(true), 0.4 * untrained);
+    }
+    mixInto(meta, contributions, 1);
+  }
+  EXPECT_GT(meanReturn(false), 0.4 * untrained);
+}
+
+}  // namespace
+}  // namespace pmeta
