@@ -299,7 +299,7 @@ TEST(SacPersonalLearner, NetworksWithLambdaZeroAreEachRobotsOwn) {
   adam.lambda = 10;
   SacLambdas lambdas;
   lambdas.critic = 0;
-  SacPersonalLearner learner([] { return std::make_unique<PointMass>(); }, settings, adam, 0, 3,
+  SacPersonalLearner learner([] { return std::make_unique<Goal>(0.5); }, settings, adam, 0, 3,
                              lambdas);
   Rng rng(1, 0, Stream::kSample);
   const Model meta = learner.initialModel(1);

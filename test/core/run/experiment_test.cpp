@@ -226,7 +226,9 @@ TEST(Experiment, LoadReadsAFile) {
 TEST(Experiment, TheRepositorysConfigsAreValid) {
   const std::filesystem::path config =
       std::filesystem::path(__FILE__).parent_path() / "../../../config";
-  for (const std::string name : {"gridworld", "gridworld_conflict"}) {
+  for (const std::string name :
+       {"gridworld", "gridworld_conflict", "cart_pole", "mountain_car", "half_cheetah_dir",
+        "half_cheetah_vel", "ant_fwd_back", "walker_2d_params", "sparse_point_robot"}) {
     const Experiment e = Experiment::load((config / (name + ".yaml")).string());
     EXPECT_EQ(e.settings().experiment, name);
     EXPECT_EQ(e.notes(), Notes{}) << name;

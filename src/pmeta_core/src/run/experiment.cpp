@@ -149,13 +149,13 @@ void Experiment::bindLearner(Settings& s) {
          "the pull after Adam's step, or in the gradient that Adam gets", {"decoupled", "coupled"});
   if (e.learner == "dqn") pmeta::bind(s, "dqn.", e.dqn);
   if (e.learner != "sac") return;
-  pmeta::bind(s, "sac.", e.sac);
   const Range own = Range::atLeast(-1);
   s.bind("personal.lambda_actor", e.personal.lambda_actor,
          "the actor's own strength; -1: lambda; 0: the actor is neither reset nor shared", own);
   s.bind("personal.lambda_critic", e.personal.lambda_critic, "the same for both critics", own);
   s.bind("personal.lambda_encoder", e.personal.lambda_encoder, "the same for the inference network",
          own);
+  pmeta::bind(s, "sac.", e.sac);
 }
 
 Experiment Experiment::build(const YAML::Node& root, const std::string& source,
