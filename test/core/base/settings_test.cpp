@@ -186,6 +186,23 @@ TEST(Settings, EmptyListsAreRefused) {
             "2 to 512.");
 }
 
+TEST(Settings, ListsMayBeEmptyWhereThatIsSaid) {
+  std::vector<int> whole = {1};
+  std::vector<double> numbers = {1.5};
+  Settings settings;
+  settings.bind("whole", whole, "any", {}, Empty::kAllowed);
+  settings.bind("numbers", numbers, "any", {}, Empty::kAllowed);
+  settings.assign("whole:=[]");
+  settings.read(parseYaml("numbers: []", "a.yaml"), "a.yaml");
+  EXPECT_TRUE(whole.empty());
+  EXPECT_TRUE(numbers.empty());
+  EXPECT_EQ(settings.yaml(), "whole: []\nnumbers: []\n");
+  settings.assign("numbers:=[2, 3]");
+  EXPECT_EQ(numbers, (std::vector<double>{2, 3}));
+  settings.read(parseYaml("whole: []\nnumbers: []\n", "b.yaml"), "b.yaml");
+  EXPECT_TRUE(numbers.empty());
+}
+
 TEST(Settings, DuplicateKeysAreRefused) {
   EXPECT_EQ(readError("rounds: 3\nseed: 1\nrounds: 4\n"),
             "setting 'rounds' stands twice (a.yaml line 3): keep one of them.");

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <set>
 
 #include "../support.h"
 
@@ -43,9 +44,33 @@ TEST(Env, StatesAreCheckedForSizeNumbersAndSteps) {
   }
 }
 
+TEST(Env, AStepIsJudgedByItsSparseRewardIfItHasOne) {
+  EXPECT_EQ((Step{-2, false, false}).evaluatedReward(), -2);
+  EXPECT_EQ((Step{-2, false, false, 0.5}).evaluatedReward(), 0.5);
+  EXPECT_EQ((Step{-2, false, false, 0}).evaluatedReward(), 0);
+}
+
+// training and test tasks have names of their own, and the environments that the names promise
+TEST(Env, FamiliesTellTheirTasksApart) {
+  for (const std::string& name : envFamilyNames()) {
+    const auto family = makeEnvFamily(name);
+    family->build(0);
+    std::set<std::string> names;
+    const int count = family->numTasks() + family->numTestTasks();
+    for (int task = 0; task < count; ++task) {
+      EXPECT_TRUE(names.insert(family->taskName(task)).second) << family->taskName(task);
+      EXPECT_EQ(family->taskName(task).find_first_of(" ,"), std::string::npos);
+      EXPECT_FALSE(family->taskDescription(task).empty());
+      EXPECT_EQ(family->make(task)->spec().name, name);
+      const bool is_test = family->taskName(task).find("_test_") != std::string::npos;
+      EXPECT_EQ(is_test, task >= family->numTasks()) << family->taskName(task);
+    }
+  }
+}
+
 // every family hands out states that go on as the original does
 TEST(Env, GoesOnFromItsState) {
-  for (const std::string name : {"gridworld", "cart_pole", "mountain_car"}) {
+  for (const std::string& name : envFamilyNames()) {
     const auto family = makeEnvFamily(name);
     family->build(0);
     const auto one = family->make(0), other = family->make(0);
@@ -57,17 +82,22 @@ TEST(Env, GoesOnFromItsState) {
     while (!over) {
       other->setState(one->state());
       EXPECT_EQ(other->state(), one->state());
-      const double action = static_cast<double>(rng.below(spec.num_actions));
-      const Step a = one->step(&action, rng, seen.data());
-      const Step b = other->step(&action, rng, again.data());
+      std::vector<double> action(spec.action_size);
+      for (double& a : action) {
+        a = spec.num_actions > 0 ? static_cast<double>(rng.below(spec.num_actions))
+                                 : 2 * rng.uniform() - 1;
+      }
+      const Step a = one->step(action.data(), rng, seen.data());
+      const Step b = other->step(action.data(), rng, again.data());
       ASSERT_EQ(seen, again) << name;
       ASSERT_EQ(a.reward, b.reward);
+      ASSERT_EQ(a.sparse_reward, b.sparse_reward);
       ASSERT_EQ(a.terminated, b.terminated);
       ASSERT_EQ(a.truncated, b.truncated);
       over = a.terminated || a.truncated;
     }
     EXPECT_EQ(one->state(), other->state()) << name;
-    EXPECT_EQ(errorOf([&] { one->setState({}); }), "a state of " + name +
+    EXPECT_EQ(errorOf([&] { one->setState({}); }), "a state of " + spec.name +
                                                        " has 0 numbers but must have " +
                                                        std::to_string(other->state().size()) + ".");
   }

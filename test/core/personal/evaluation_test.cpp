@@ -65,6 +65,27 @@ double returnFrom(double value) {
   return sum;
 }
 
+// one step of dense reward -5 that counts 3
+class Sparse : public Env {
+ public:
+  const EnvSpec& spec() const override { return spec_; }
+  void reset(Rng&, double* observation) override { observation[0] = 0; }
+  Step step(const double*, Rng&, double*) override { return {-5, true, false, 3}; }
+
+ private:
+  EnvSpec spec_{"sparse", 1, 1, 0, 1};
+};
+
+TEST(Evaluation, CountsTheSparseRewardWhereThereIsOne) {
+  std::vector<std::unique_ptr<Env>> envs;
+  envs.push_back(std::make_unique<Sparse>());
+  Evaluation evaluation(std::move(envs));
+  Rng rng(1, 0, Stream::kEvaluate);
+  const auto still = [](const float*, int, double* actions) { actions[0] = 0; };
+  EXPECT_EQ(evaluation.run(still, rng).mean, 3);
+  EXPECT_EQ(evaluation.record(still, rng).rewards, std::vector<double>{3});
+}
+
 TEST(Evaluation, IsTheMeanOverEpisodesRunOneByOne) {
   for (const int episodes : {1, 2, 10, 37}) {
     Evaluation evaluation = makeEvaluation(episodes);

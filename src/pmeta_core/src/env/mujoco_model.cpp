@@ -14,20 +14,6 @@ namespace {
 
 constexpr int kErrorSize = 1000;
 
-// an error must not return to MuJoCo, whose own handler waits for a key and ends the process
-void onError(const char* text) { throw Error(std::string("MuJoCo: ") + text + "."); }
-
-// mjData counts warnings, and MujocoSimulation looks there
-void onWarning(const char*) {}
-
-void installHandlers() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    if (mju_user_error == nullptr) mju_user_error = onError;
-    if (mju_user_warning == nullptr) mju_user_warning = onWarning;
-  });
-}
-
 // MuJoCo's text on one line, without a full stop
 std::string oneLine(const std::string& text) {
   std::string line;
@@ -40,6 +26,20 @@ std::string oneLine(const std::string& text) {
   }
   while (!line.empty() && std::strchr(", .", line.back()) != nullptr) line.pop_back();
   return line;
+}
+
+// an error must not return to MuJoCo, which could not go on; its own handler ends the process
+void onError(const char* text) { throw Error("MuJoCo: " + oneLine(text) + "."); }
+
+// mjData counts warnings, and MujocoSimulation looks there
+void onWarning(const char*) {}
+
+void installHandlers() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    if (mju_user_error == nullptr) mju_user_error = onError;
+    if (mju_user_warning == nullptr) mju_user_warning = onWarning;
+  });
 }
 
 // the names of all objects of that type, in the order of their indices
@@ -64,6 +64,7 @@ MujocoModel::MujocoModel(mjModel_* model, std::string source, const std::string&
 }
 
 MujocoModel MujocoModel::parse(const std::string& xml, const std::string& source) {
+  if (xml.empty()) throw Error("the model " + source + " is empty.");
   installHandlers();
   struct DeleteVfs {
     void operator()(mjVFS* vfs) const {
@@ -75,7 +76,7 @@ MujocoModel MujocoModel::parse(const std::string& xml, const std::string& source
   mj_defaultVFS(vfs.get());
   constexpr char kName[] = "model.xml";
   if (mj_makeEmptyFileVFS(vfs.get(), kName, static_cast<int>(xml.size())) != 0) {
-    throw Error("the model " + source + " is empty.");
+    throw Error("the model " + source + " does not fit into memory.");
   }
   std::copy(xml.begin(), xml.end(), static_cast<char*>(vfs->filedata[0]));
   char complaint[kErrorSize] = "";
