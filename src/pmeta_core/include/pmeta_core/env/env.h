@@ -24,10 +24,11 @@ struct Step {
   double reward = 0;
   bool terminated = false;  ///< a terminal state: nothing to bootstrap from
   bool truncated = false;   ///< the horizon was reached: the value of the state goes on
-  /// where training is on a denser reward than the task is about: the task's own, which evaluation
-  /// returns and contexts count
+  /// Where training is on a denser reward than the task is about: the task's own, which evaluation
+  /// returns and contexts count.
   std::optional<double> sparse_reward = std::nullopt;
 
+  /// The reward that a return is made of when a policy is judged.
   double evaluatedReward() const { return sparse_reward.value_or(reward); }
 };
 
