@@ -196,5 +196,49 @@ TEST_F(KernelsTest, AdamGivesTheSameBitsOnEveryInstructionSetAtAnyAlignment) {
   }
 }
 
+TEST_F(KernelsTest, TanhGaussianAgreesWithDouble) {
+  for (const std::size_t n : {1, 15, 16, 100, 3003}) {
+    const auto mean = noise(n, 1, 12), log_std = noise(n, 2, 8), e = noise(n, 3, 3);
+    expectSameBits([&](const Kernels& kernel) {
+      std::vector<float> action(n), deviation(n), log_density(n);
+      kernel.tanhGaussian(mean.data(), log_std.data(), e.data(), -5, 2, action.data(),
+                          deviation.data(), log_density.data(), n);
+      for (std::size_t k = 0; k < n; ++k) {
+        const double l = std::min(std::max<double>(log_std[k], -5), 2.0);
+        const double d = std::exp(l) * e[k], u = mean[k] + d, size = std::abs(u);
+        const double log_slope = 2 * (std::log(2) - size - std::log1p(std::exp(-2 * size)));
+        const double expected = -0.5 * e[k] * e[k] - l - 0.5 * std::log(2 * M_PI) - log_slope;
+        EXPECT_NEAR(action[k], std::tanh(u), 1e-6) << u;
+        EXPECT_NEAR(deviation[k], d, 3e-7 * std::abs(d)) << l;
+        EXPECT_NEAR(log_density[k], expected, 1e-6 * (4 + 2 * size)) << u;
+      }
+      std::vector<float> all = action;
+      all.insert(all.end(), deviation.begin(), deviation.end());
+      all.insert(all.end(), log_density.begin(), log_density.end());
+      return all;
+    });
+  }
+}
+
+TEST_F(KernelsTest, TanhGaussianOfTheEndsOfTheRange) {
+  const std::vector<float> mean = {200, -200,  1e30f,
+                                   0,   1e-6f, std::numeric_limits<float>::quiet_NaN()};
+  const std::vector<float> log_std(6, -50), e(6);
+  for (const std::string& name : kernelNames()) {
+    setKernels(name);
+    std::vector<float> action(6), deviation(6), log_density(6);
+    kernels().tanhGaussian(mean.data(), log_std.data(), e.data(), -5, 2, action.data(),
+                           deviation.data(), log_density.data(), 6);
+    EXPECT_EQ(action[0], 1);
+    EXPECT_EQ(action[1], -1);
+    EXPECT_EQ(action[2], 1);
+    EXPECT_EQ(action[3], 0);
+    EXPECT_NEAR(action[4], 1e-6, 1e-7);
+    EXPECT_TRUE(std::isnan(action[5])) << "divergence shows";
+    EXPECT_NEAR(log_density[0], 5 - 0.5 * std::log(2 * M_PI) - 2 * (std::log(2) - 200), 1e-3);
+    EXPECT_TRUE(std::isfinite(log_density[2]));
+  }
+}
+
 }  // namespace
 }  // namespace pmeta

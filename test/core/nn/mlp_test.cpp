@@ -208,6 +208,51 @@ TEST(Mlp, BatchesOfAnySizeAgree) {
   }
 }
 
+TEST(Mlp, BackwardOfChosenRowsIsThatOfTheWhole) {
+  const Mlp mlp({"q", 5, {24, 17}, 1});
+  const auto parameters = initialised(mlp, 1), input = noise(40 * 5, 2), d_q = noise(40, 3);
+  MlpWorkspace workspace(mlp, 40);
+  mlp.forward(parameters.data(), input.data(), 40, workspace);
+  std::vector<float> whole(40 * 2), some(3 * 2);
+  mlp.backwardInput(parameters.data(), 40, d_q.data(), 1, 2, whole.data(), workspace);
+  const std::vector<std::size_t> rows = {3, 17, 39};
+  const std::vector<float> d_rows = {d_q[3], d_q[17], d_q[39]};
+  mlp.backwardInput(parameters.data(), 3, d_rows.data(), 1, 2, some.data(), workspace, rows.data());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t c = 0; c < 2; ++c) EXPECT_NEAR(some[2 * i + c], whole[2 * rows[i] + c], 1e-6);
+  }
+}
+
+TEST(Mlp, BackwardOfTheFirstRowsIsThatOfASmallerBatch) {
+  const Mlp mlp({"q", 5, {24, 17}, 3});
+  const auto parameters = initialised(mlp, 1), input = noise(40 * 5, 2), d_y = noise(10 * 3, 3);
+  MlpWorkspace large(mlp, 40), small(mlp, 10);
+  mlp.forward(parameters.data(), input.data(), 40, large);
+  mlp.forward(parameters.data(), input.data(), 10, small);
+  std::vector<float> a(mlp.size()), b(mlp.size());
+  mlp.backward(parameters.data(), input.data(), 10, d_y.data(), a.data(), nullptr, large);
+  mlp.backward(parameters.data(), input.data(), 10, d_y.data(), b.data(), nullptr, small);
+  for (std::size_t k = 0; k < a.size(); ++k) ASSERT_NEAR(a[k], b[k], 1e-5);
+}
+
+TEST(Mlp, SharedInputGradientIsTheSumOverRows) {
+  for (const std::vector<std::size_t>& hidden : {std::vector<std::size_t>{24, 17}, {}}) {
+    const Mlp mlp({"q", 5, hidden, 2});
+    const auto parameters = initialised(mlp, 1), input = noise(30 * 5, 2), d_y = noise(30 * 2, 3);
+    MlpWorkspace workspace(mlp, 30);
+    mlp.forward(parameters.data(), input.data(), 30, workspace);
+    std::vector<float> gradient(mlp.size()), d_input(30 * 5), shared = {10, 20, 30};
+    mlp.backward(parameters.data(), input.data(), 30, d_y.data(), gradient.data(), d_input.data(),
+                 workspace);
+    mlp.addSharedInputGradient(parameters.data(), gradient.data(), 1, 3, shared.data());
+    for (std::size_t i = 0; i < 3; ++i) {
+      double sum = 10 * (static_cast<double>(i) + 1);
+      for (std::size_t b = 0; b < 30; ++b) sum += d_input[5 * b + 1 + i];
+      EXPECT_NEAR(shared[i], sum, 2e-5);
+    }
+  }
+}
+
 TEST(Mlp, BlocksAreNamedAsInPyTorch) {
   const Mlp plain({"q", 4, {8, 6}, 2}), dueling({"q", 4, {8}, 2, true});
   EXPECT_EQ(ModelLayout(Precision::kFloat32, plain.blocks()).text(),

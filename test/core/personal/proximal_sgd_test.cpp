@@ -157,5 +157,17 @@ TEST(ProximalSgd, DivergesAboveTheStatedBoundAndConvergesBelow) {
   }
 }
 
+TEST(ProximalSgd, TargetFollowsWhatHasMoved) {
+  double phi[] = {9, 1, 3}, omega[] = {9, 1, 3}, target[] = {0, 5};
+  ProximalSgd<double> optimizer(phi, omega, 3, 0.5, 0, 0);
+  const double gradient[] = {2, -2};
+  optimizer.apply(1, gradient, 2, target, 0.25);
+  EXPECT_DOUBLE_EQ(phi[1], 0);
+  EXPECT_DOUBLE_EQ(phi[2], 4);
+  EXPECT_DOUBLE_EQ(target[0], 0);
+  EXPECT_DOUBLE_EQ(target[1], 5 + 0.25 * (4 - 5));
+  EXPECT_EQ(phi[0], 9);
+}
+
 }  // namespace
 }  // namespace pmeta

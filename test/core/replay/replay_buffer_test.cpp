@@ -7,6 +7,8 @@
 #include <fstream>
 #include <string>
 
+#include "../support.h"
+
 namespace pmeta {
 namespace {
 
@@ -68,6 +70,33 @@ TEST(ReplayBuffer, MemoryBecomesResidentAsTransitionsArrive) {
   for (int k = 0; k < 2000000; ++k) buffer.add(Sample(k).view());
   EXPECT_LT(residentMegabytes() - before, 90);
   EXPECT_EQ(buffer.values().data(), values) << "reserved once";
+}
+
+TEST(ReplayBuffer, GoesOnFromWhatItHandsOut) {
+  const auto add = [](ReplayBuffer& buffer, float x) { buffer.add({&x, &x, x, 0.9f, &x}); };
+  for (const int count : {0, 3, 5, 8}) {
+    ReplayBuffer a(5, 1, 1), b(5, 1, 1);
+    for (int i = 0; i < count; ++i) add(a, static_cast<float>(i));
+    add(b, 100);
+    b.restore(a.values(), a.next());
+    for (int i = 0; i < 3; ++i) {
+      add(a, static_cast<float>(10 + i));
+      add(b, static_cast<float>(10 + i));
+    }
+    EXPECT_EQ(a.values(), b.values());
+    EXPECT_EQ(a.size(), b.size());
+    EXPECT_EQ(a.next(), b.next());
+  }
+}
+
+TEST(ReplayBuffer, RefusesWhatDoesNotFit) {
+  ReplayBuffer buffer(4, 1, 1);
+  EXPECT_EQ(test::errorOf([&] { buffer.restore(std::vector<float>(9), 0); }),
+            "a replay of 9 numbers, next slot 0, does not fit one of 4 transitions of 5 numbers: "
+            "restore it with the settings it was saved with.");
+  EXPECT_NE(test::errorOf([&] { buffer.restore(std::vector<float>(25), 0); }), "(no error)");
+  EXPECT_NE(test::errorOf([&] { buffer.restore(std::vector<float>(10), 0); }), "(no error)");
+  EXPECT_NE(test::errorOf([&] { buffer.restore(std::vector<float>(20), 4); }), "(no error)");
 }
 
 }  // namespace
