@@ -6,6 +6,7 @@
 #include "pmeta_core/env/cart_pole.h"
 #include "pmeta_core/env/gridworld.h"
 #include "pmeta_core/env/mountain_car.h"
+#include "pmeta_core/env/sparse_point.h"
 #include "pmeta_core/replay/prioritised_replay.h"
 
 namespace bench {
@@ -17,12 +18,15 @@ constexpr int kSteps = 1000;
 double stepSeconds(benchmark::State& state, pmeta::Env& env) {
   pmeta::Rng rng(0, 0, pmeta::Stream::kMeasure);
   std::vector<double> actions(4096);
-  for (double& action : actions) action = static_cast<double>(rng.below(env.spec().num_actions));
+  const int num_actions = env.spec().num_actions;
+  for (double& action : actions) {
+    action = num_actions > 0 ? static_cast<double>(rng.below(num_actions)) : 2 * rng.uniform() - 1;
+  }
   std::vector<double> observation(env.spec().observation_size);
   env.reset(rng, observation.data());
   std::size_t i = 0;
   return callSeconds(state, kSteps, [&] {
-    const pmeta::Step step = env.step(&actions[i++ % 4096], rng, observation.data());
+    const pmeta::Step step = env.step(&actions[i++ % 4000], rng, observation.data());
     if (step.terminated || step.truncated) env.reset(rng, observation.data());
     benchmark::DoNotOptimize(observation.data());
   });
@@ -59,6 +63,12 @@ void GridworldStep(benchmark::State& state) {
   report({Part::kLoops, 22}, "gridworld step", Unit::kSeconds, stepSeconds(state, env));
 }
 BENCHMARK(GridworldStep)->Unit(benchmark::kMicrosecond);
+
+void SparsePointStep(benchmark::State& state) {
+  pmeta::SparsePoint env({});
+  report({Part::kLoops, 26}, "point robot step", Unit::kSeconds, stepSeconds(state, env));
+}
+BENCHMARK(SparsePointStep)->Unit(benchmark::kMicrosecond);
 
 // what ten environments add to an update, beside their actions
 void TenCartPoleSteps(benchmark::State& state) {

@@ -9,7 +9,7 @@
 
 namespace pmeta::test {
 
-/// The lines of a recorded file as cells; [0] is the header, so that line n of the file is [n - 1]
+/// The lines of a recorded file as cells; [0] is the header, so that line n of the file is [n - 1].
 using Lines = std::vector<std::vector<std::string>>;
 
 inline Lines linesOf(const std::string& path) {

@@ -41,9 +41,9 @@ constexpr char kUsage[] =
   settings [ENVIRONMENT]               list every setting with its meaning
   replay KIND FILE [--tasks FILE]      simulate recorded trajectories (CSV, also gzip) again and
                                        compare. KIND: ant, cartpole, half_cheetah, mountaincar,
-                                       sparse_point, walker2d, walker2d_params. The last and
-                                       sparse_point need the file of their tasks; of cartpole and
-                                       mountaincar they are the paper's unless one is given.
+                                       sparse_point, walker2d, walker2d_params. sparse_point and
+                                       walker2d_params need the file of their tasks; of cartpole
+                                       and mountaincar they are the paper's unless it is given.
                                        ant_model, half_cheetah_model, walker2d_model compare a file of
                                        figures of the compiled model instead.
   evaluate POLICY_FILE [--episodes N] [--task I]
