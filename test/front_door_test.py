@@ -256,8 +256,10 @@ def test_the_installed_packages_work_like_the_source_tree(tmp_path):
          "run_id:=installed"], env=env)
     manifest = json.loads((tmp_path / "gridworld/installed/manifest.json").read_text())
     assert manifest["status"] == "finished"
-    plot = run(["rosrun", "pmeta_nodes", "plot.py", "--help"], env=env)
-    assert plot.returncode == 0, plot.stderr
+    for program in ("plot.py", "report.py"):
+        result = run(["rosrun", "pmeta_nodes", program, tmp_path / "gridworld/installed"], env=env)
+        assert result.returncode == 0, result.stderr
+    assert (tmp_path / "gridworld/installed/report.html").exists()
 
 
 def test_every_program_answers_help(tmp_path):

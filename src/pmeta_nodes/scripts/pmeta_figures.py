@@ -226,7 +226,8 @@ def draw_points(axis, values, members, measure, policy, label, style):
 
 def task_figure(experiment, groups, figures, prefix):
     """PP and MP of each task, every seed a dot: a task that is stuck shows, which a mean hides."""
-    figures.write(pt.task_csv(experiment, groups), prefix + "tasks_last.csv")
+    figures.write(pt.csv_text(pt.TASK_COLUMNS, pt.task_rows(experiment, groups)),
+                  prefix + "tasks_last.csv")
     shown = groups
     if len(groups) > MAX_TASK_GROUPS:
         first = pr.reference(pmeta_only(groups) or groups)

@@ -86,6 +86,7 @@ class Run:
                             % (folder, self.experiment))
         self.seed = _required(folder, manifest, "seed", int)
         self.num_rounds = _required(folder, manifest, "rounds", int)
+        self.manifest = manifest
         self.started = str(manifest.get("started") or "")
         self.commit = str(manifest.get("commit") or "unknown")
         self.optimal = _optimal_return(manifest)
