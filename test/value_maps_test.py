@@ -15,7 +15,6 @@ import pmeta_drawing as pd
 import pmeta_mountain_car as mc
 import pmeta_policies as pp
 import pmeta_value_maps as pv
-from pmeta_files import PlotError
 
 RECORDED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "data",
                         "mountaincar_traj.csv.gz")
@@ -182,6 +181,18 @@ def test_a_broken_policy_is_told_in_one_sentence(tmp_path, folder, change, words
         file.write(change(data))
     message = fails(tmp_path, "--what", "values")
     assert path in message and words in message
+
+
+def test_settings_that_do_not_fit_the_tasks_are_refused(tmp_path, folder):
+    path = edit(folder, "config.yaml", lambda t: t.replace("zeta: [5, 3]", "zeta: [5, 3, 4]"))
+    assert fails(tmp_path, "--what", "values") == (
+        "plot: %s: environment.zeta must be one number, or one for each of 2 tasks." % path)
+
+
+def test_a_table_is_no_network(tmp_path, folder):
+    write_policy(os.path.join(folder, "policies", "meta.safetensors"), {"q_table": [[1.0]]})
+    assert fails(tmp_path, "--what", "values").endswith(
+        "meta.safetensors holds no Q-network: its tensors are q_table.")
 
 
 if __name__ == "__main__":

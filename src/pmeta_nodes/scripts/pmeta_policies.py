@@ -24,6 +24,9 @@ class Policy:
         layers = sum(name.startswith("q.layer") and name.endswith(".weight")
                      for name in self.tensors)
         dueling = "q.value.weight" in self.tensors
+        if not layers and not dueling:
+            raise PlotError("%s holds no Q-network: its tensors are %s."
+                            % (self.path, ", ".join(sorted(self.tensors)) or "none"))
         for i in range(layers):
             x = self._linear(x, "q.layer%d" % i)
             if dueling or i < layers - 1:

@@ -7,6 +7,7 @@ import numpy as np
 import pmeta_mountain_car as mc
 import pmeta_runs as pr
 from pmeta_drawing import folder_for, headline
+from pmeta_files import PlotError
 from pmeta_policies import policies_of
 
 STARTS = {-0.6: "-", -0.5: "--", -0.4: ":"}  # at rest, with the line of their trajectory
@@ -36,9 +37,13 @@ class NetworkView:
 def cars_of(run):
     """The run's tasks, from its effective settings."""
     columns = []
-    for key in ("zeta", "force", "gravity"):
-        value = run.settings["environment." + key]
-        columns.append(value if isinstance(value, tuple) else (value,) * run.num_tasks)
+    for key in ("environment.zeta", "environment.force", "environment.gravity"):
+        value = run.settings.get(key)
+        column = value if isinstance(value, tuple) else (value,) * run.num_tasks
+        if len(column) != run.num_tasks or not all(pr.is_number(v) for v in column):
+            raise PlotError("%s/config.yaml: %s must be one number, or one for each of %d tasks."
+                            % (run.folder, key, run.num_tasks))
+        columns.append(column)
     return [mc.MountainCar(*task) for task in zip(*columns)]
 
 
