@@ -1,7 +1,6 @@
 """Tests of `pmeta plot`: run folders written here, numbers worked out here from their CSV text."""
 
 import csv
-import json
 import math
 import os
 import re

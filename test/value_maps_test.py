@@ -36,7 +36,7 @@ def write_policy(path, tensors, metadata=None):
 
 
 def swinging(strength):
-    """A Q-network whose values are -relu(velocity), -1, -relu(-velocity), scaled: it pushes along."""
+    """A Q-network whose values are -relu(v), -1, -relu(-v), scaled: it pushes along."""
     return {"q.layer0.weight": [[0, strength], [0, -strength]], "q.layer0.bias": [0, 0],
             "q.layer1.weight": [[-1, 0], [0, 0], [0, -1]], "q.layer1.bias": [0, -1, 0]}
 

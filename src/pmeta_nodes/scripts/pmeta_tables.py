@@ -127,18 +127,18 @@ def legend_lines(rows):
     """What the tables of returns mean."""
     lines = ["Returns are means over the training tasks, as mean ± standard deviation over seeds.",
              "PP: personal policies. MP: meta-policy. last: at the last round. AUC: mean over the",
-              "rounds. MP - MA, PP - MA: AUC less that of model averaging's meta-policy, paired by",
-              "seed, as mean ± standard error. best: the largest in any round, on that round's",
-              "evaluation episodes, as the paper has it."]
+             "rounds. MP - MA, PP - MA: AUC less that of model averaging's meta-policy, paired by",
+             "seed, as mean ± standard error. best: the largest in any round, on that round's",
+             "evaluation episodes, as the paper has it."]
     if any(row["fresh_seeds"] for row in rows):
-        lines += ["fresh (best), fresh (last): the policies of that round and of the last round, on",
-                  "episodes that had no part in the choice."]
+        lines += ["fresh (best), fresh (last): the policies of that round and of the last round,",
+                  "on episodes that had no part in the choice."]
     if any(row["all_fresh_best_mean"] is not None for row in rows):
         lines += ["all: every personal policy on every task, mean over all pairs (the paper's DQN;",
                   "its DQN* is the PP of independent)."]
     if any(row["experiment"] in PAPER for row in rows):
-        lines += ["paper, λ and paper, best: its table by λ and its table of best returns, whatever",
-                  "the other settings here."]
+        lines += ["paper, λ and paper, best: its table by λ and its table of best returns,",
+                  "whatever the other settings here."]
     lines.append("-: not run.")
     return lines
 
