@@ -6,11 +6,16 @@ import random
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
 
 TOP = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(TOP / "src/pmeta_nodes/scripts"))
+import pmeta_bags
+import pmeta_runs
+
 LOCAL = TOP / "devel/lib/pmeta_core/pmeta_local"
 CONFIG = TOP / "config/gridworld.yaml"
 
@@ -221,6 +226,20 @@ def test_a_bag_of_the_whole_run_is_recorded_on_request(tmp_path):
     for topic in ("/pmeta/auxiliary", "/pmeta/meta_policy", "/pmeta/returns", "/pmeta/round"):
         assert topic in info, info
 
+    # what was recorded gives the curves of the run folder; the recorder may miss the first rounds
+    plot = run([TOP / "pmeta", "plot", bag])
+    assert plot.returncode == 0, plot.stderr
+    assert (tmp_path / "gridworld/figures/r_learning_curves.png").exists()
+    [recorded] = pmeta_bags.read_bag(str(bag))
+    [logged] = pmeta_runs.load_runs([str(tmp_path / "gridworld/r")])
+    assert recorded.rounds[-1] == 10 and len(recorded.rounds) >= 5
+    for policy in ("personal", "meta"):
+        by_round = dict(zip(logged.rounds, logged.curves[policy]))
+        complete = [r for r in recorded.rounds if len(recorded.returns[policy][r]) == 5]
+        assert len(complete) >= 5
+        by_round_recorded = dict(zip(recorded.rounds, recorded.curves[policy]))
+        assert [by_round_recorded[r] for r in complete] == [by_round[r] for r in complete]
+
 
 def test_the_installed_packages_work_like_the_source_tree(tmp_path):
     # programs, launch files and settings from install/ alone; catkin writes its path into setup.sh
@@ -237,8 +256,10 @@ def test_the_installed_packages_work_like_the_source_tree(tmp_path):
          "run_id:=installed"], env=env)
     manifest = json.loads((tmp_path / "gridworld/installed/manifest.json").read_text())
     assert manifest["status"] == "finished"
-    plot = run(["rosrun", "pmeta_nodes", "plot.py", "--help"], env=env)
-    assert plot.returncode == 0, plot.stderr
+    for program in ("plot.py", "report.py"):
+        result = run(["rosrun", "pmeta_nodes", program, tmp_path / "gridworld/installed"], env=env)
+        assert result.returncode == 0, result.stderr
+    assert (tmp_path / "gridworld/installed/report.html").exists()
 
 
 def test_every_program_answers_help(tmp_path):

@@ -1,7 +1,6 @@
 #!/usr/bin/python3
-"""Figures and tables from pMeta's run folders; `plot.py --help` says how."""
+"""Figures and tables from pMeta's run folders and bags; `plot.py --help` says how."""
 
-import argparse
 import os
 import sys
 
@@ -10,37 +9,44 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import pmeta_runs as pr
 import pmeta_tables as pt
 from pmeta_files import PlotError
+from pmeta_program import Parser, run_program
 
-KINDS = ("curves", "sweep", "tasks", "convergence")
-FORMATS = ("png", "pdf")
+# as in pmeta_kinds, which is slow to load, and of no use to a wrong argument
 NEEDS = {"curves": "it has no finished run",
          "sweep": "no numeric setting of pMeta-RL differs between its runs",
          "tasks": "it has neither networks nor fresh episodes",
+         "values": "it has no run of mountain_car with policies",
          "convergence": "it has no finished convergence run"}
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        raise PlotError("%s; see --help." % message)
+FORMATS = ("png", "pdf")
 
 
 def parse_arguments(arguments):
     parser = Parser(
-        prog="plot", description="Draws figures and tables from run folders of pMeta.",
+        prog="plot", description="Draws figures and tables from run folders and bags of pMeta.",
         epilog="Runs are grouped by the settings that differ, seeds apart. Runs whose status is "
-        "not 'finished' are left out and named.")
+        "not 'finished' are left out and named. A bag gives learning curves from its topic returns "
+        "alone.")
     parser.add_argument("dirs", metavar="DIR", nargs="+",
-                        help="a run folder, or any folder above run folders")
-    parser.add_argument("--out", metavar="DIR", help="where to write (default: FIRST_DIR/figures)")
+                        help="a run folder, any folder above run folders, or a rosbag of a run")
+    parser.add_argument("--out", metavar="DIR",
+                        help="where to write (default: FIRST_DIR/figures, for a bag beside it)")
     parser.add_argument("--what", metavar="LIST",
-                        help="some of %s (default: all that the data allow)" % ",".join(KINDS))
+                        help="some of %s (default: all that the data allow)" % ",".join(NEEDS))
     parser.add_argument("--format", metavar="LIST", default=",".join(FORMATS),
                         help="some of %s (default: both)" % ",".join(FORMATS))
     options = parser.parse_args(arguments)
-    options.out = options.out or os.path.join(options.dirs[0], "figures")
-    options.asked = _choices("--what", options.what, KINDS) if options.what is not None else ()
+    options.bags = [path for path in options.dirs if is_bag(path)]
+    first = options.dirs[0]
+    options.dirs = [path for path in options.dirs if path not in options.bags]
+    options.out = options.out or os.path.join(
+        os.path.dirname(first) if first in options.bags else first, "figures")
+    options.asked = _choices("--what", options.what, NEEDS) if options.what is not None else ()
     options.formats = _choices("--format", options.format, FORMATS)
     return options
+
+
+def is_bag(path):
+    return os.path.isfile(path) and path.endswith(".bag")
 
 
 def _choices(name, text, known):
@@ -51,60 +57,51 @@ def _choices(name, text, known):
     return chosen
 
 
-def run(options):
-    kinds = options.asked or KINDS
-    run_folders, convergence_folders = pr.find_folders(options.dirs)
-    where = " or ".join(options.dirs)
-    if not run_folders and not convergence_folders:
-        raise PlotError("there are no runs in %s: a run folder holds manifest.json and rounds.csv."
-                        % where)
-    experiments = pr.group_runs(pr.load_runs(run_folders))
-    convergence = pr.load_convergence(convergence_folders)
-    if not experiments and not convergence:
-        raise PlotError("none of the %d runs in %s has finished."
-                        % (len(run_folders) + len(convergence_folders), where))
-
-    # slow to load, and of no use to a wrong argument
-    import pmeta_convergence as pc
+def plot_folders(options):
+    experiments, convergence = pr.load(options.dirs)
     import pmeta_drawing as pd
-    import pmeta_figures as pf
+    import pmeta_kinds as pk
     os.makedirs(options.out, exist_ok=True)
     rows = pt.summary_rows(experiments)
     written = pt.write_tables(experiments, rows, options.out)
-    figures = {kind: pd.Figures(options.out, options.formats) for kind in KINDS}
-    with pd.style():
-        pf.draw_runs(experiments, kinds, figures)
-        if "convergence" in kinds:
-            pc.draw_convergence(convergence, figures["convergence"])
-    for kind in kinds:
-        written += figures[kind].written
+    figures = {kind: pd.Figures(options.out, options.formats) for kind in pk.KINDS}
+    pk.draw(experiments, convergence, options.asked or pk.KINDS, figures)
     if rows:
         print(pt.summary_text(rows))
-    for path in written:
+    for path in written + [path for kind in pk.KINDS for path in figures[kind].written]:
         print("wrote " + path)
     for kind in options.asked:
         if not figures[kind].written:
             raise PlotError("there is nothing to draw for %s in %s: %s."
-                            % (kind, where, NEEDS[kind]))
+                            % (kind, " or ".join(options.dirs), NEEDS[kind]))
+
+
+def plot_bags(options):
+    import pmeta_bags as pb
+    runs = [run for path in options.bags for run in pb.read_bag(path)]
+    import pmeta_drawing as pd
+    import pmeta_figures as pf
+    os.makedirs(options.out, exist_ok=True)
+    figures = pd.Figures(options.out, options.formats)
+    with pd.style():
+        for run in runs:
+            pf.bag_curves(run, pb.name_of(run), figures)
+    for path in figures.written:
+        print("wrote " + path)
+
+
+def run(arguments):
+    options = parse_arguments(arguments)
+    if options.asked and "curves" not in options.asked and not options.dirs:
+        raise PlotError("a bag gives curves alone.")
+    if options.bags:
+        plot_bags(options)
+    if options.dirs:
+        plot_folders(options)
 
 
 def main(arguments):
-    for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="replace")
-    try:
-        run(parse_arguments(arguments))
-        sys.stdout.flush()
-    except PlotError as error:
-        print("plot: " + str(error), file=sys.stderr)
-        return 1
-    except BrokenPipeError:
-        # the reader has seen enough, and every file has been written
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except OSError as error:
-        print("plot: cannot use %s (%s)." % (error.filename or "the output", error.strerror),
-              file=sys.stderr)
-        return 1
-    return 0
+    return run_program("plot", run, arguments)
 
 
 if __name__ == "__main__":

@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import NullFormatter
 
-from pmeta_drawing import (BLACK, BLUE, GREEN, GREY, PALETTE, RED, headline, legend_right, panels,
-                           spread_ticks)
+from pmeta_drawing import (BLACK, BLUE, GREEN, GREY, PALETTE, RED, folder_for, headline,
+                           legend_right, panels, spread_ticks)
 from pmeta_files import require_columns
 
 UPDATES = {  # of fixed_point.csv: label, style
@@ -29,7 +29,7 @@ def draw_convergence(found, figures):
                 ("distance.csv", draw_distance,
                  ("diversity", "lambda", "distance2", "entry_distance2", "entry_bound")))
     for folder, files in found.items():
-        prefix = os.path.basename(os.path.normpath(folder)) + os.sep if len(found) > 1 else ""
+        prefix = folder_for(os.path.basename(os.path.normpath(folder)), found)
         for name, draw, needed in drawings:
             if name in files and len(next(iter(files[name].values()))):
                 require_columns(os.path.join(folder, name), files[name], needed)

@@ -52,6 +52,11 @@ class Figures:
         self.written.append(path)
 
 
+def folder_for(name, names):
+    """Where the figures of one of several experiments lie; of a single one, in no folder."""
+    return name + os.sep if len(names) > 1 else ""
+
+
 def panels(rows, columns, sharey=True, panel_width=None):
     """Axes rows x columns; unless their width is given, with room for a legend on the right."""
     width = 3.3 * columns + 2.6 if columns > 1 else 7.2

@@ -1,6 +1,5 @@
 """Figures of pMeta's runs: learning curves, sweeps of a setting, and returns task by task."""
 
-import os
 import textwrap
 
 import matplotlib.pyplot as plt
@@ -9,7 +8,7 @@ from matplotlib.ticker import MaxNLocator
 
 import pmeta_runs as pr
 import pmeta_tables as pt
-from pmeta_drawing import (BLACK, BLUE, GREEN, GREY, PALETTE, PURPLE, RED, headline,
+from pmeta_drawing import (BLACK, BLUE, GREEN, GREY, PALETTE, PURPLE, RED, folder_for, headline,
                            legend_right, panels, spread_ticks)
 from pmeta_files import SNAPSHOTS
 
@@ -21,7 +20,7 @@ BASELINES = {  # algorithm: (the policy it is judged by, label, style)
     "independent": ("personal", "PP, independent",
                     {"color": PURPLE, "linestyle": "-.", "marker": "D"}),
 }
-RETURN = "return (mean over tasks)"
+RETURN = "return\n(reward per episode, mean over tasks)"
 MAX_PANELS = 3
 MAX_SLICES = 4
 MAX_TASK_GROUPS = 6
@@ -114,6 +113,20 @@ def learning_curves(experiment, groups, figures, prefix):
     legend_right(axes[0])
     headline(figure, "%s: %s" % (experiment, over_seeds("mean ± standard deviation", drawn)))
     figures.save(figure, prefix + "learning_curves")
+
+
+def bag_curves(run, name, figures):
+    """PP and MP of a run from its bag; which algorithm it was the returns do not say."""
+    group = pr.Group("bag", {}, [run])
+    figure, axes = panels(1, 1)
+    for policy, label, style in (("meta", "MP", MP), ("personal", "PP", PP)):
+        if policy in group.policies:
+            draw_curve(axes[0][0], group, policy, label, **style)
+    round_axis(axes[0][0], run.rounds)
+    axes[0][0].set_ylabel(RETURN)
+    legend_right(axes[0])
+    headline(figure, "run %s, from its bag" % run.run_id)
+    figures.save(figure, name + "_learning_curves")
 
 
 def setting_curves(experiment, key, members, groups, figures, name):
@@ -213,7 +226,8 @@ def draw_points(axis, values, members, measure, policy, label, style):
 
 def task_figure(experiment, groups, figures, prefix):
     """PP and MP of each task, every seed a dot: a task that is stuck shows, which a mean hides."""
-    figures.write(pt.task_csv(experiment, groups), prefix + "tasks_last.csv")
+    figures.write(pt.csv_text(pt.TASK_COLUMNS, pt.task_rows(experiment, groups)),
+                  prefix + "tasks_last.csv")
     shown = groups
     if len(groups) > MAX_TASK_GROUPS:
         first = pr.reference(pmeta_only(groups) or groups)
@@ -239,7 +253,7 @@ def task_figure(experiment, groups, figures, prefix):
         part.replace(" ", "\u00a0") for part in name.split(", ")), 30) for name in names])
     axes[0][0].set_ylim(tasks - 0.5, -0.5)
     for axis in axes[-1]:
-        axis.set_xlabel("return of the task")
+        axis.set_xlabel("return of the task (reward per episode)")
     legend_right(list(axes.flat) + [axes[0][-1]])
     many = max(len(group.runs) for group in shown) > 1
     headline(figure, "%s, task by task: %s%s" % (
@@ -272,7 +286,7 @@ def draw_runs(experiments, kinds, figures):
     """Figures of every experiment; with several, each in a folder of its own."""
     curves, sweeps = figures["curves"], figures["sweep"]
     for experiment, groups in experiments.items():
-        prefix = experiment + os.sep if len(experiments) > 1 else ""
+        prefix = folder_for(experiment, experiments)
         if "curves" in kinds:
             learning_curves(experiment, groups, curves, prefix)
         if "tasks" in kinds and any(g.deep or any(r.fresh for r in g.runs) for g in groups):

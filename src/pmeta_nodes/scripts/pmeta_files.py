@@ -1,5 +1,6 @@
 """The files of a run folder, read and checked: what is wrong is named by file and line."""
 
+import contextlib
 import math
 import sys
 
@@ -16,8 +17,21 @@ class PlotError(Exception):
     """What is wrong with the input, in one sentence."""
 
 
+_receivers = [lambda text: print("pmeta: warning: " + text, file=sys.stderr)]
+
+
 def warn(text):
-    print("plot: warning: " + text, file=sys.stderr)
+    _receivers[-1](text)
+
+
+@contextlib.contextmanager
+def warnings_to(receiver):
+    """Within it, warn(text) calls receiver(text)."""
+    _receivers.append(receiver)
+    try:
+        yield
+    finally:
+        _receivers.pop()
 
 
 def read_columns(path):

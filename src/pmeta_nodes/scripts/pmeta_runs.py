@@ -57,6 +57,21 @@ def _refuse(error):
     raise error
 
 
+def load(dirs):
+    """(experiments, convergence): all that has finished in and below `dirs`; throws PlotError."""
+    run_folders, convergence_folders = find_folders(dirs)
+    where = " or ".join(dirs)
+    if not run_folders and not convergence_folders:
+        raise PlotError("there are no runs in %s: a run folder holds manifest.json and rounds.csv."
+                        % where)
+    experiments = group_runs(load_runs(run_folders))
+    convergence = load_convergence(convergence_folders)
+    if not experiments and not convergence:
+        raise PlotError("none of the %d runs in %s has finished."
+                        % (len(run_folders) + len(convergence_folders), where))
+    return experiments, convergence
+
+
 class Run:
     """A finished run: its settings, and per round the mean return over the training tasks."""
 
@@ -71,6 +86,7 @@ class Run:
                             % (folder, self.experiment))
         self.seed = _required(folder, manifest, "seed", int)
         self.num_rounds = _required(folder, manifest, "rounds", int)
+        self.manifest = manifest
         self.started = str(manifest.get("started") or "")
         self.commit = str(manifest.get("commit") or "unknown")
         self.optimal = _optimal_return(manifest)

@@ -10,7 +10,9 @@ import pmeta_runs as pr
 from pmeta_files import SNAPSHOTS
 
 WIDTH = 120
-BEST_HEADS = {"best": "best", "fresh_best": "fresh (best)", "fresh_last": "fresh (last)"}
+BEST_HEADS = {"best": "best", "last": "last", "fresh_best": "fresh (best)",
+              "fresh_last": "fresh (last)"}
+LEARNING_HEADS = ("group", "seeds", "PP last", "MP last", "PP AUC", "MP AUC", "MP - MA", "PP - MA")
 COLUMNS = ("experiment", "group", "algorithm", "lambda", "seeds", "pp_last_mean", "pp_last_std",
            "mp_last_mean", "mp_last_std", "pp_auc_mean", "pp_auc_std", "mp_auc_mean",
            "mp_auc_std", "pairs", "mp_minus_ma_auc", "mp_minus_ma_auc_se", "pp_minus_ma_auc",
@@ -112,27 +114,33 @@ def summary_text(rows):
     for experiment in dict.fromkeys(row["experiment"] for row in rows):
         members = [row for row in rows if row["experiment"] == experiment]
         lines += ["experiment %s: learning" % experiment]
-        lines += aligned(("group", "seeds", "PP last", "MP last", "PP AUC", "MP AUC", "MP - MA",
-                          "PP - MA"), [learning_cells(row) for row in members])
+        lines += aligned(LEARNING_HEADS, [learning_cells(row) for row in members])
         lines += ["", "experiment %s: best returns" % experiment]
-        lines += best_table(experiment, members)
+        # the last returns stand in the table above
+        lines += aligned(*best_cells(experiment, members, ("best", "fresh_best", "fresh_last")),
+                         left=2)
         lines.append("")
-    lines += ["Returns are means over the training tasks, as mean ± standard deviation over seeds.",
-              "PP: personal policies. MP: meta-policy. last: at the last round. AUC: mean over the",
-              "rounds. MP - MA, PP - MA: AUC less that of model averaging's meta-policy, paired by",
-              "seed, as mean ± standard error. best: the largest in any round, on that round's",
-              "evaluation episodes, as the paper has it."]
+    return "\n".join(lines + legend_lines(rows)) + "\n"
+
+
+def legend_lines(rows):
+    """What the tables of returns mean."""
+    lines = ["Returns are means over the training tasks, as mean ± standard deviation over seeds.",
+             "PP: personal policies. MP: meta-policy. last: at the last round. AUC: mean over the",
+             "rounds. MP - MA, PP - MA: AUC less that of model averaging's meta-policy, paired by",
+             "seed, as mean ± standard error. best: the largest in any round, on that round's",
+             "evaluation episodes, as the paper has it."]
     if any(row["fresh_seeds"] for row in rows):
-        lines += ["fresh (best), fresh (last): the policies of that round and of the last round, on",
-                  "episodes that had no part in the choice."]
+        lines += ["fresh (best), fresh (last): the policies of that round and of the last round,",
+                  "on episodes that had no part in the choice."]
     if any(row["all_fresh_best_mean"] is not None for row in rows):
         lines += ["all: every personal policy on every task, mean over all pairs (the paper's DQN;",
                   "its DQN* is the PP of independent)."]
     if any(row["experiment"] in PAPER for row in rows):
-        lines += ["paper, λ and paper, best: its table by λ and its table of best returns, whatever",
-                  "the other settings here."]
+        lines += ["paper, λ and paper, best: its table by λ and its table of best returns,",
+                  "whatever the other settings here."]
     lines.append("-: not run.")
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def learning_cells(row):
@@ -143,9 +151,10 @@ def learning_cells(row):
             ("mp_minus_ma_auc", "mp_minus_ma_auc_se"), ("pp_minus_ma_auc", "pp_minus_ma_auc_se")))
 
 
-def best_table(experiment, rows):
-    measures = [m for m, head in BEST_HEADS.items()
-                if m == "best" or any(row["fresh_seeds"] for row in rows)]
+def best_cells(experiment, rows, measures=tuple(BEST_HEADS)):
+    """(heads, lines): a line for each group and policy, the paper's numbers where there are any."""
+    measures = [m for m in measures
+                if not m.startswith("fresh") or any(row["fresh_seeds"] for row in rows)]
     heads = ("group", "policy") + tuple(BEST_HEADS[m] for m in measures)
     if experiment in PAPER:
         heads += ("paper, λ", "paper, best")
@@ -158,7 +167,7 @@ def best_table(experiment, rows):
                 cells += tuple(plus_minus(*pair) for pair in paper_values(row, name))
             lines.append(cells)
             label = ""
-    return aligned(heads, lines, left=2)
+    return heads, lines
 
 
 def best_policies(row):
@@ -288,8 +297,8 @@ def latex_table(caption, columns, lines):
         + [r"    \bottomrule", r"  \end{tabular}", r"\end{table}"]) + "\n"
 
 
-def task_csv(experiment, groups):
-    """Returns task by task of every group, at the best round and at the last."""
+def task_rows(experiment, groups):
+    """A dict with TASK_COLUMNS for every group, snapshot, policy and task."""
     rows = []
     for group in groups:
         for snapshot in SNAPSHOTS:
@@ -304,7 +313,7 @@ def task_csv(experiment, groups):
                             experiment, group.label, snapshot, policies, data[1], task,
                             group.runs[0].task_names[task], len(values), float(values.mean()), std,
                             float(values.min()), float(values.max())))))
-    return csv_text(TASK_COLUMNS, rows)
+    return rows
 
 
 def write_tables(experiments, rows, out):

@@ -1,0 +1,18 @@
+"""The kinds of figures that run folders give, and the one call that draws them."""
+
+import pmeta_convergence as pc
+import pmeta_drawing as pd
+import pmeta_figures as pf
+import pmeta_value_maps as pv
+
+KINDS = ("curves", "sweep", "tasks", "values", "convergence")
+
+
+def draw(experiments, convergence, kinds, figures):
+    """Draws what the data allow; `figures` holds a pd.Figures for each kind."""
+    with pd.style():
+        pf.draw_runs(experiments, kinds, figures)
+        if "values" in kinds:
+            pv.draw_value_maps(experiments, figures["values"])
+        if "convergence" in kinds:
+            pc.draw_convergence(convergence, figures["convergence"])

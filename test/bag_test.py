@@ -1,0 +1,141 @@
+"""Tests of `pmeta plot` on rosbags: written here from the messages' definitions."""
+
+import csv
+import os
+import subprocess
+import sys
+
+import pytest
+
+from run_folders import curve, fails, plot, write_run
+import pmeta_bags as pb
+import pmeta_drawing as pd
+import pmeta_figures as pf
+import pmeta_runs as pr
+
+rosbag = pytest.importorskip("rosbag")
+import genpy.dynamic
+
+MSG = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "src", "pmeta_msgs", "msg")
+HEADER_DEFINITION = "\n".join(["", "=" * 80, "MSG: std_msgs/Header", "uint32 seq", "time stamp",
+                               "string frame_id", ""])
+
+
+@pytest.fixture(scope="module")
+def message_class():
+    with open(os.path.join(MSG, "TaskReturn.msg")) as file:
+        definition = file.read() + HEADER_DEFINITION
+    return genpy.dynamic.generate_dynamic("pmeta_msgs/TaskReturn", definition)[
+        "pmeta_msgs/TaskReturn"]
+
+
+def write_bag(path, folder, message_class, keep=lambda row: True, run_id="r", twice=False):
+    """The returns of a run folder as the agents publish them, in an order of their own."""
+    with open(os.path.join(folder, "rounds.csv")) as file:
+        rows = [row for row in csv.DictReader(file) if keep(row)]
+    with rosbag.Bag(str(path), "w") as bag:
+        for i, row in enumerate(sorted(rows, key=lambda row: (row["round"], -int(row["task"])))):
+            message = message_class(run_id=run_id, task=int(row["task"]), round=int(row["round"]),
+                                    policy_name=row["policy"], split_name=row["split"],
+                                    return_mean=float(row["return_mean"]))
+            bag.write("/pmeta/returns", message, genpy.Time(i + 1))
+            if twice:
+                message.return_mean = 1e6
+                bag.write("/pmeta/returns", message, genpy.Time(i + 1, 1))
+    return str(path)
+
+
+def test_curves_of_a_bag_equal_those_of_rounds_csv(tmp_path, message_class):
+    folder = write_run(tmp_path, seed=3)
+    path = write_bag(tmp_path / "r.bag", folder, message_class, twice=True)
+    [run] = pb.read_bag(path)
+    [of_folder] = pr.load_runs([folder])
+    assert list(run.rounds) == list(of_folder.rounds)
+    for policy in ("personal", "meta"):
+        assert list(run.curves[policy]) == list(of_folder.curves[policy])
+        assert list(run.curves[policy]) == pytest.approx(curve(folder, policy), rel=1e-14)
+
+
+def test_the_figure_shows_both_policies(tmp_path, message_class):
+    class Kept(pd.Figures):
+        def save(self, figure, name):
+            self.written.append((figure, name))
+
+    folder = write_run(tmp_path, seed=3)
+    kept = Kept("", ())
+    [run] = pb.read_bag(write_bag(tmp_path / "r.bag", folder, message_class))
+    pf.bag_curves(run, pb.name_of(run), kept)
+    [(figure, name)] = kept.written
+    assert name == "r_learning_curves"
+    drawn = {line.get_label(): list(line.get_ydata()) for line in figure.axes[0].lines}
+    assert drawn == {"MP": list(run.curves["meta"]), "PP": list(run.curves["personal"])}
+
+
+def test_figures_of_a_bag_stand_beside_it(tmp_path, message_class):
+    bag = write_bag(tmp_path / "r.bag", write_run(tmp_path), message_class)
+    out, err = plot(bag)
+    assert sorted(os.listdir(str(tmp_path / "figures"))) == ["r_learning_curves.pdf",
+                                                             "r_learning_curves.png"]
+    assert out.count("wrote ") == 2 and err == ""
+    # beside a run folder both are drawn
+    plot(tmp_path / "grid", bag, "--out", tmp_path / "both", "--format", "png")
+    assert {"learning_curves.png", "r_learning_curves.png"} <= set(
+        os.listdir(str(tmp_path / "both")))
+    assert fails(bag, "--what", "sweep") == "plot: a bag gives curves alone."
+
+
+def test_no_installed_messages_are_needed(tmp_path, message_class):
+    bag = write_bag(tmp_path / "r.bag", write_run(tmp_path), message_class)
+    script = os.path.join(os.path.dirname(pb.__file__), "plot.py")
+    result = subprocess.run([sys.executable, script, bag], stdout=subprocess.PIPE,
+                            stderr=subprocess.PIPE, universal_newlines=True, timeout=60,
+                            env={"PATH": "/usr/bin:/bin"})
+    assert result.returncode == 0, result.stderr
+
+
+def test_rounds_and_returns_that_were_not_recorded_are_named(tmp_path, message_class):
+    folder = write_run(tmp_path)
+    late = write_bag(tmp_path / "late.bag", folder, message_class,
+                     lambda row: row["round"] != "1" and (row["round"], row["task"]) != ("3", "0"))
+    [run] = pb.read_bag(late)
+    assert list(run.rounds) == [2, 3, 4]
+    assert list(run.curves["meta"])[::2] == [curve(folder, "meta")[i] for i in (1, 3)]
+    _, err = plot(late)
+    assert "late.bag lacks 1 of the first 4 rounds (first: round 1)" in err
+    assert "returns of some tasks are missing in 1 rounds (first: round 3)" in err
+
+
+def test_bags_without_returns_are_told_in_one_sentence(tmp_path, message_class):
+    path = str(tmp_path / "r.bag")
+    with rosbag.Bag(path, "w"):
+        pass
+    assert fails(path) == ("plot: %s has no topic returns of type pmeta_msgs/TaskReturn; its "
+                           "topics are: none." % path)
+    other = genpy.dynamic.generate_dynamic("a/B", "float64 x\n")["a/B"]
+    with rosbag.Bag(path, "w") as bag:
+        bag.write("/pmeta/returns", other(x=1), genpy.Time(1))
+    assert fails(path).endswith("its topics are: /pmeta/returns.")
+    write_bag(path, write_run(tmp_path), message_class, lambda row: row["policy"] == "personal"
+              and row["round"] == "1" or row["policy"] == "meta" and row["round"] == "2")
+    assert fails(path) == "plot: %s has no round with returns of every policy." % path
+
+
+@pytest.mark.parametrize("change, words", [
+    (lambda data: data[:len(data) // 2], "is cut off, or its recording was: mend it"),
+    (lambda data: b"", "is not a readable bag (empty file)."),
+    (lambda data: b"round,task\n1,2\n", "is not a readable bag"),
+    (lambda data: data.replace(b"\x08\0\0\0personal", b"\xff\xff\0\0personal"),
+     "is not a readable bag"),
+])
+def test_a_broken_bag_is_told_in_one_sentence(tmp_path, message_class, change, words):
+    path = write_bag(tmp_path / "r.bag", write_run(tmp_path), message_class)
+    with open(path, "rb") as file:
+        data = file.read()
+    with open(path, "wb") as file:
+        file.write(change(data))
+    message = fails(path)
+    assert path in message and words in message
+
+
+if __name__ == "__main__":
+    sys.exit(pytest.main([__file__]))

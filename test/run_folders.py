@@ -1,0 +1,157 @@
+"""Run folders written for the tests of plot and report, and numbers read straight from them."""
+
+import contextlib
+import csv
+import io
+import json
+import math
+import os
+import statistics
+import sys
+
+SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)),
+                       "..", "src", "pmeta_nodes", "scripts")
+sys.path.insert(0, SCRIPTS)
+import plot as program
+import pmeta_runs as pr
+
+HEADER = "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s"
+FRESH_HEADER = "snapshot,round,policy,trained_task,task,return_mean,return_std,episodes"
+CONFIG = """experiment: {experiment}
+algorithm: {algorithm}
+seed: {seed}
+rounds: {rounds}
+learner: {learner}
+fresh_episodes: {fresh}
+results_dir: /somewhere
+run_id: {run_id}
+personal:
+  alpha: 0.08
+  lambda: {lambda_}
+  eta: 0.08
+  personal_init: meta
+aggregation:
+  beta: {beta}
+environment:
+  name: gridworld
+  sizes: [4, 5]
+  slip: [0]
+"""
+
+
+def write_run(top, algorithm="pmeta", seed=0, lambda_=10, rounds=4, status="finished",
+              experiment="grid", run_id=None, scale=1.0, optimal=None, started="2026-01-01",
+              learner="q_learning", fresh=0):
+    """A run of two tasks whose returns are uneven numbers, different for every setting and seed."""
+    run_id = run_id or "%s_l%g_s%d" % (algorithm, lambda_, seed)
+    folder = os.path.join(str(top), experiment, run_id)
+    os.makedirs(folder)
+    lambda_ = lambda_ if algorithm == "pmeta" else 0
+    with open(os.path.join(folder, "config.yaml"), "w") as file:
+        file.write(CONFIG.format(experiment=experiment, algorithm=algorithm, seed=seed,
+                                 rounds=rounds, run_id=run_id, lambda_=lambda_,
+                                 learner=learner, fresh=fresh,
+                                 beta=0 if algorithm == "independent" else 1))
+    tasks = [{"task": task, "split": "train", "description": "zeta %g, force 1" % (3 + task / 2)}
+             for task in range(2)]
+    for task, value in zip(tasks, optimal or ()):
+        task["optimal_return"] = value
+    with open(os.path.join(folder, "manifest.json"), "w") as file:
+        json.dump({"experiment": experiment, "run_id": run_id, "algorithm": algorithm, "seed": seed,
+                   "status": status, "rounds_done": rounds, "rounds": rounds, "started": started,
+                   "commit": "abc", "tasks": tasks}, file)
+    lines = [HEADER]
+    for round_ in range(1, rounds + 1):
+        for policy in ("personal",) if algorithm == "independent" else ("personal", "meta"):
+            for task in range(2):
+                value = scale * (-40 / round_ - 3 * task - 0.37 * seed * (2 - task) - 0.1 * lambda_
+                                 - 1.7 * (policy == "personal") - math.sin(seed * round_ + lambda_))
+                lines.append("%d,%d,train,%s,%r,1.5,15,%d,%d,0.000010"
+                             % (round_, task, policy, value, 100 * round_, 3 * round_))
+    with open(os.path.join(folder, "rounds.csv"), "w") as file:
+        file.write("\n".join(lines) + "\n")
+    if fresh:
+        write_fresh(folder, algorithm, seed + lambda_, fresh)
+    return folder
+
+
+def write_fresh(folder, algorithm, shift, episodes):
+    """As the core does: last before best, personal before meta, all pairs of independent runs."""
+    lines = [FRESH_HEADER]
+    for number, (policy, snapshot) in enumerate(
+            (p, s) for p in ("personal", "meta") for s in ("last", "best")):
+        if (policy, algorithm) == ("meta", "independent"):
+            continue
+        for trained in range(2) if policy == "personal" else (-1,):
+            for task in range(2):
+                if policy == "personal" and trained != task and algorithm != "independent":
+                    continue
+                value = (-50 - 9 * (trained != task) - 3.1 * task - number
+                         - 0.7 * math.cos(shift))
+                lines.append("%s,3,%s,%d,%d,%r,2.5,%d" % (snapshot, policy, trained, task, value,
+                                                         episodes))
+    with open(os.path.join(folder, "final.csv"), "w") as file:
+        file.write("\n".join(lines) + "\n")
+
+
+def call(main, *arguments, code=0):
+    """Runs a program in this process, which is quick, and returns (stdout, stderr)."""
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        result = main([str(a) for a in arguments])
+    texts = []
+    for stream in (out, err):
+        stream.flush()
+        texts.append(stream.buffer.getvalue().decode("utf-8"))
+    assert result == code, texts[1]
+    return texts
+
+
+def plot(*arguments, code=0):
+    return call(program.main, *arguments, code=code)
+
+
+def fails(*arguments, main=program.main, name="plot"):
+    """The one sentence with which it refuses."""
+    _, message = call(main, *arguments, code=1)
+    lines = message.strip().split("\n")
+    assert lines[-1].startswith(name + ": ") and lines[-1].endswith(".")
+    assert all(line.startswith(name + ": warning: ") for line in lines[:-1])
+    return lines[-1]
+
+
+def summary(out):
+    with open(os.path.join(str(out), "summary.csv"), encoding="utf-8") as file:
+        return {row["group"]: row for row in csv.DictReader(file)}
+
+
+def fresh_mean(folder, snapshot, policy, own=True):
+    with open(os.path.join(folder, "final.csv")) as file:
+        return statistics.mean(
+            float(row["return_mean"]) for row in csv.DictReader(file)
+            if (row["snapshot"], row["policy"]) == (snapshot, policy)
+            and (policy == "meta" or not own or row["task"] == row["trained_task"]))
+
+
+def curve(folder, policy):
+    """Mean return over the tasks in each round, straight from the file."""
+    by_round = {}
+    with open(os.path.join(folder, "rounds.csv")) as file:
+        for row in csv.DictReader(file):
+            if row["policy"] == policy:
+                by_round.setdefault(int(row["round"]), []).append(float(row["return_mean"]))
+    return [statistics.mean(by_round[r]) for r in sorted(by_round)]
+
+
+def edit(folder, name, change):
+    path = os.path.join(folder, name)
+    with open(path) as file:
+        text = file.read()
+    with open(path, "w") as file:
+        file.write(change(text))
+    return path
+
+
+def groups_of(top):
+    folders, _ = pr.find_folders([str(top)])
+    return pr.group_runs(pr.load_runs(folders))
