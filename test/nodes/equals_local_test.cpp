@@ -16,9 +16,12 @@ TEST_F(RunOverRos, TopicsReadWellInPlainRosTools) {
   EXPECT_NE(returns.find("return_mean: "), std::string::npos) << returns;
 
   const std::string topics = output("timeout 20 rostopic list");
-  for (const char* topic :
-       {"/pmeta/agent_status", "/pmeta/auxiliary", "/pmeta/meta_policy", "/pmeta/returns",
-        "/pmeta/round", "/pmeta/task_0/trajectory", "/pmeta/task_4/trajectory", "/diagnostics"}) {
+  const std::string last = "/pmeta/task_" + std::to_string(experiment_.totalTasks() - 1);
+  for (const std::string& topic :
+       {std::string("/pmeta/agent_status"), std::string("/pmeta/auxiliary"),
+        std::string("/pmeta/meta_policy"), std::string("/pmeta/returns"),
+        std::string("/pmeta/round"), std::string("/pmeta/task_0/trajectory"), last + "/trajectory",
+        std::string("/diagnostics")}) {
     EXPECT_NE(topics.find(topic), std::string::npos) << topic << " is not in\n" << topics;
   }
   const std::string round = output("timeout 20 rostopic echo -n 1 /pmeta/round/message");
@@ -29,12 +32,14 @@ TEST_F(RunOverRos, TopicsReadWellInPlainRosTools) {
 
 TEST_F(RunOverRos, EveryAgentEndsInStateDone) {
   ASSERT_TRUE(waitFor([&] { return finished(); }));
-  const std::string echo = output("timeout 20 rostopic echo -n 5 /pmeta/agent_status/state");
-  std::size_t done = 0;
+  const int agents = experiment_.totalTasks();
+  const std::string echo = output("timeout 20 rostopic echo -n " + std::to_string(agents) +
+                                  " /pmeta/agent_status/state");
+  int done = 0;
   for (std::size_t at = echo.find("4\n"); at != std::string::npos; at = echo.find("4\n", at + 1)) {
     ++done;
   }
-  EXPECT_EQ(done, 5u) << echo;
+  EXPECT_EQ(done, agents) << echo;
 }
 
 }  // namespace
