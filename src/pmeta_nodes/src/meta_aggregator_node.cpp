@@ -194,11 +194,18 @@ void MetaAggregatorNode::closeRoundIfDue() {
 void MetaAggregatorNode::writeCompleteRounds(bool force) {
   for (const pmeta::RoundBook::Round& round : book_.take(force)) {
     log_.write(round);
-    const std::uint32_t refused = summary_.refused;
+    const RoundSummary before = summary_;
     summary_ = toMsg(round.summary, experiment_);
-    summary_.refused = refused;
+    summary_.refused = before.refused;
+    if (round.rows.empty()) {
+      // not evaluated: the last returns still are the newest
+      summary_.personal_return = before.personal_return;
+      summary_.meta_return = before.meta_return;
+      summary_.test_return = before.test_return;
+    }
     publishRound(RoundSummary::RUNNING,
                  "round " + std::to_string(round.summary.round) + " is complete");
+    if (!experiment_.evaluates(round.summary.round)) continue;
     const std::string test =
         experiment_.numTestTasks() == 0 ? "" : "  test " + shortNumber(round.summary.test_return);
     ROS_INFO("round %d/%d  PP %s  MP %s%s  %.2f s  ETA %.0f s", round.summary.round,

@@ -150,7 +150,7 @@ void TaskAgentNode::train() {
 void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
   const int rounds = experiment_.settings().rounds;
   waitForAggregator();
-  if (meta.round > 0 && experiment_.evaluatesMeta()) {
+  if (meta.round > 0 && experiment_.evaluatesMeta() && experiment_.evaluates(meta.round)) {
     setState(AgentStatus::EVALUATING,
              "evaluating the meta-policy of round " + std::to_string(meta.round));
     for (const pmeta::TaskReturn& result : agent_.evaluateMeta(meta)) deliver(result);
@@ -184,16 +184,18 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    status_.env_steps_per_s = static_cast<double>(result->personal.env_steps) / seconds;
-    status_.updates_per_s = static_cast<double>(result->personal.updates) / seconds;
+    status_.env_steps_per_s = static_cast<double>(result->env_steps) / seconds;
+    status_.updates_per_s = static_cast<double>(result->updates) / seconds;
     status_.loss = result->loss;
     status_.distance_to_meta = result->distance;
   }
   // before the aggregator can end the run, and with it this process
   if (round == rounds) savePersonal();
-  deliver(result->personal);
+  if (result->personal) deliver(*result->personal);
   deliver(result->update);
-  if (trajectory_pub_) publishEpisode(agent_.recordPersonal(), round, pmeta::Policy::kPersonal);
+  if (trajectory_pub_ && result->personal) {
+    publishEpisode(agent_.recordPersonal(), round, pmeta::Policy::kPersonal);
+  }
   setState(AgentStatus::WAITING, "waiting for the meta-policy of round " + std::to_string(round));
 }
 

@@ -103,6 +103,28 @@ TEST(LocalRunner, CountsStepsAndUpdatesOverRounds) {
   }
 }
 
+TEST(LocalRunner, EvaluatesAtItsIntervalAndInTheLastRound) {
+  const LocalResult all = run({"rounds:=7"});
+  const LocalResult some = run({"rounds:=7", "evaluation_interval:=3"});
+  EXPECT_TRUE(all.meta == some.meta) << "evaluating changes nothing";
+  ASSERT_EQ(some.rounds.size(), 7u);
+  for (std::size_t c = 0; c < 7; ++c) {
+    const auto& rows = some.rounds[c].rows;
+    if (c != 2 && c != 5 && c != 6) {
+      EXPECT_TRUE(rows.empty());
+      EXPECT_TRUE(std::isnan(some.rounds[c].summary.personal_return));
+      continue;
+    }
+    // the same returns, and the counters of all rounds
+    ASSERT_EQ(rows.size(), all.rounds[c].rows.size());
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      EXPECT_EQ(rows[k].result.mean, all.rounds[c].rows[k].result.mean);
+      EXPECT_EQ(rows[k].env_steps, all.rounds[c].rows[k].env_steps);
+      EXPECT_EQ(rows[k].updates, all.rounds[c].rows[k].updates);
+    }
+  }
+}
+
 TEST(LocalRunner, MetaRowsAreTheReturnsOfTheMetaPolicyAfterTheRound) {
   const Experiment experiment = gridExperiment({"rounds:=1"});
   const LocalResult result = runLocally(experiment);

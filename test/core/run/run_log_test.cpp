@@ -231,6 +231,58 @@ TEST(RoundBook, ForcedRoundsComeOutAsTheyAre) {
   EXPECT_EQ(csvOf(second), "2,0,train,personal,0,-200,0.1,3,2000,3,0.000000\n");
 }
 
+TEST(RoundBook, RoundsThatDoNotEvaluateWaitForNoReturn) {
+  RoundBook book(threeTasks({"evaluation_interval:=3"}));
+  EXPECT_FALSE(book.add(makeReturn(1, 0, Policy::kPersonal)));
+  EXPECT_TRUE(book.hasPersonal(1));
+  EXPECT_EQ(book.awaited(), Tasks{});
+  EXPECT_TRUE(book.take().empty()) << "not closed";
+  book.closeRound(1, {0, 1, 2}, {}, 1);
+  book.closeRound(2, {0, 1, 2}, {}, 1);
+  EXPECT_EQ(book.take().size(), 2u);
+  EXPECT_FALSE(book.hasPersonal(3));
+  EXPECT_EQ(book.awaited(), (Tasks{0, 1, 2}));
+  book.closeRound(3, {0, 1, 2}, {}, 1);
+  EXPECT_TRUE(book.take().empty());
+  addAll(book, 3);
+  EXPECT_EQ(book.take().size(), 1u);
+  EXPECT_FALSE(book.hasPersonal(4)) << "the last round evaluates";
+}
+
+TEST(RoundBook, TestTasksOweOnlyMetaReturnsForEachContext) {
+  const Experiment experiment = Experiment::parse(
+      "learner: sac\nenvironment: {name: half_cheetah_dir, directions: [-1], test_directions: "
+      "[1]}\n"
+      "sac: {hidden: [4], task_encoding: inference, exploration_episodes: [2, 5]}\n"
+      "personal: {alpha: 0.001, eta: 0.01}\nrun_id: run\n",
+      "test");
+  ASSERT_EQ(experiment.totalTasks(), 2);
+  RoundBook book(experiment);
+  TaskReturn test = makeReturn(1, 1, Policy::kMeta);
+  EXPECT_FALSE(book.add(test)) << "task 1 is a test task";
+  test.split = Split::kTest;
+  test.context_episodes = 3;
+  EXPECT_FALSE(book.add(test)) << "after 3 episodes nobody evaluates";
+  EXPECT_TRUE(book.hasPersonal(1) == false);
+  EXPECT_TRUE(book.add(makeReturn(1, 0, Policy::kPersonal)));
+  EXPECT_TRUE(book.hasPersonal(1)) << "a test task has no personal policy";
+  book.closeRound(1, {0}, {}, 1);
+  for (const int context : {0, 2, 5}) {
+    EXPECT_TRUE(book.take().empty());
+    TaskReturn meta = makeReturn(1, 0, Policy::kMeta);
+    meta.context_episodes = test.context_episodes = context;
+    meta.mean = context;
+    test.mean = 10 * context;
+    EXPECT_TRUE(book.add(meta));
+    EXPECT_TRUE(book.add(test));
+  }
+  const auto rounds = book.take();
+  ASSERT_EQ(rounds.size(), 1u);
+  EXPECT_EQ(rounds[0].rows.size(), 7u);
+  EXPECT_EQ(rounds[0].summary.meta_return, 5) << "after the most exploration";
+  EXPECT_EQ(rounds[0].summary.test_return, 50);
+}
+
 TEST(RoundBook, IndependentRunsHaveNoMetaReturns) {
   RoundBook book(threeTasks({"algorithm:=independent"}));
   book.closeRound(1, {0, 1, 2}, {}, 1);

@@ -38,14 +38,14 @@ TEST(TaskAgent, ReportsItsRound) {
   EXPECT_EQ(result->update.task, 1);
   EXPECT_EQ(result->update.round, 5);
   EXPECT_EQ(result->update.weight, 1);
-  EXPECT_EQ(result->personal.run_id, "run");
-  EXPECT_EQ(result->personal.round, 5);
-  EXPECT_EQ(result->personal.task, 1);
-  EXPECT_EQ(result->personal.policy, Policy::kPersonal);
-  EXPECT_EQ(result->personal.split, Split::kTrain);
-  EXPECT_EQ(result->personal.episodes, 24);
-  EXPECT_EQ(result->personal.updates, 3 * 2);
-  EXPECT_EQ(result->personal.env_steps, 3 * 2 * 2 * 24 * 4);
+  EXPECT_EQ(result->personal->run_id, "run");
+  EXPECT_EQ(result->personal->round, 5);
+  EXPECT_EQ(result->personal->task, 1);
+  EXPECT_EQ(result->personal->policy, Policy::kPersonal);
+  EXPECT_EQ(result->personal->split, Split::kTrain);
+  EXPECT_EQ(result->personal->episodes, 24);
+  EXPECT_EQ(result->personal->updates, 3 * 2);
+  EXPECT_EQ(result->personal->env_steps, 3 * 2 * 2 * 24 * 4);
   EXPECT_GT(result->loss, 0);
   EXPECT_GT(result->distance, 0);
 }
@@ -66,7 +66,7 @@ TEST(TaskAgent, SendsAuxiliaryOrPersonalParametersAsTheAlgorithmSays) {
                 (algorithm == "pmeta" ? learner->auxiliary() : learner->personal()))
         << algorithm;
     EXPECT_EQ(result->distance, distance(learner->personal(), meta.model));
-    EXPECT_EQ(result->personal.mean, learner->evaluate(learner->personal(), rng).mean);
+    EXPECT_EQ(result->personal->mean, learner->evaluate(learner->personal(), rng).mean);
   }
 }
 
@@ -79,7 +79,7 @@ TEST(TaskAgent, ARestartedAgentSendsWhatOneThatNeverStoppedSends) {
     TaskAgent restarted(experiment, 3);
     const auto found = restarted.trainRound(meta);
     EXPECT_TRUE(found->update.model == expected->update.model) << "round " << round;
-    EXPECT_EQ(found->personal.mean, expected->personal.mean);
+    EXPECT_EQ(found->personal->mean, expected->personal->mean);
     EXPECT_EQ(found->distance, expected->distance);
   }
 }

@@ -148,6 +148,7 @@ int run(Arguments arguments) {
   printNotes(experiment);
   const pmeta::LocalResult result =
       pmeta::runLocally(experiment, &log, [&](const pmeta::RoundSummary& summary) {
+        if (!experiment.evaluates(summary.round)) return !g_stop;
         const std::string test =
             experiment.numTestTasks() == 0 ? "" : "  test " + shortNumber(summary.test_return);
         std::printf("round %d/%d  PP %s  MP %s%s  %s  ETA %s\n", summary.round, summary.rounds,

@@ -109,6 +109,9 @@ void Experiment::bind(Settings& s) {
   s.bind("rounds", e.rounds, "C: how often the meta-policy is aggregated", Range::between(1, 1e6));
   s.bind("updates_per_round", e.updates_per_round, "R: personalised and auxiliary updates a round",
          Range::between(1, 1e9));
+  s.bind("evaluation_interval", e.evaluation_interval,
+         "rounds from one evaluation of the policies to the next; the last is always evaluated",
+         Range::between(1, 1e6));
   s.bind("results_dir", e.results_dir, "where run folders go; \"\" means ~/.ros/pmeta");
   s.bind("run_id", e.run_id, "name of the run; \"\" means start time, algorithm and seed");
   s.bind("pace", e.pace, "least seconds between rounds, to watch a fast experiment",

@@ -33,7 +33,7 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
     for (TaskAgent& agent : agents) {
       if (!agent.trains()) continue;
       auto trained = agent.trainRound(aggregator.metaPolicy());
-      book.add(trained->personal);
+      if (trained->personal) book.add(*trained->personal);
       const MetaAggregator::Answer answer =
           aggregator.offer(std::make_shared<AuxiliaryUpdate>(std::move(trained->update)));
       if (answer.verdict != MetaAggregator::Verdict::kAccepted) throw Error(answer.reason);
@@ -46,7 +46,8 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
       for (const TaskReturn& result : agent.evaluateMeta(aggregator.metaPolicy())) book.add(result);
     }
     for (RoundBook::Round& done : book.take()) {
-      if (fresh_episodes > 0) fresh.offer(done, agents, aggregator.metaPolicy());
+      if (fresh_episodes > 0 && !done.rows.empty())
+        fresh.offer(done, agents, aggregator.metaPolicy());
       if (log != nullptr) log->write(done);
       if (on_round && !on_round(done.summary)) {
         result.stopped = round < experiment.settings().rounds;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "pmeta_core/base/error.h"
 
@@ -29,6 +30,8 @@ TaskAgent::TaskAgent(const Experiment& experiment, int task)
       updates_per_round_(experiment.settings().updates_per_round),
       keeps_personal_(experiment.keepsPersonal()),
       sends_personal_(experiment.sendsPersonal()),
+      evaluation_interval_(experiment.settings().evaluation_interval),
+      rounds_(experiment.settings().rounds),
       learner_(experiment.makeLearner(task)) {}
 
 std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& meta,
@@ -40,24 +43,27 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   Rng rng(seed_, task_, Stream::kSample, round);
 
   RoundResult result;
-  std::int64_t env_steps = 0;
-  std::int64_t updates = 0;
   learner_->beginRound(meta.model, keeps_personal_);
   for (int r = 1; r <= updates_per_round_; ++r) {
     const UpdateStats stats = learner_->update(rng);
-    env_steps += stats.env_steps;
-    updates += stats.updates;
+    result.env_steps += stats.env_steps;
+    result.updates += stats.updates;
     result.loss = stats.loss;
     if (keep_going && !keep_going(r)) return std::nullopt;
   }
 
   result.distance = distance(learner_->personal(), meta.model);
-  Rng evaluation = evaluationRng();
-  result.personal =
-      makeReturn(round, Policy::kPersonal, learner_->evaluate(learner_->personal(), evaluation));
-  result.personal.env_steps = env_steps;
-  result.personal.updates = updates;
-  result.personal.seconds = watch.seconds();
+  env_steps_ += result.env_steps;
+  updates_ += result.updates;
+  if (evaluates(round)) {
+    Rng evaluation = evaluationRng();
+    TaskReturn personal =
+        makeReturn(round, Policy::kPersonal, learner_->evaluate(learner_->personal(), evaluation));
+    personal.env_steps = std::exchange(env_steps_, 0);
+    personal.updates = std::exchange(updates_, 0);
+    personal.seconds = watch.seconds();
+    result.personal = std::move(personal);
+  }
   result.update = {run_id_, task_, round,
                    sends_personal_ ? learner_->personal() : learner_->auxiliary(), 1.0};
   return result;
@@ -65,9 +71,10 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
 
 std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) const {
   checkModel(meta.model, learner_->layout(), "the aggregator");
+  std::vector<TaskReturn> results;
+  if (!evaluates(meta.round)) return results;
   const Stopwatch watch;
   Rng rng = evaluationRng();
-  std::vector<TaskReturn> results;
   for (const AdaptedReturn& adapted : learner_->evaluateAdapted(meta.model, rng)) {
     results.push_back(makeReturn(meta.round, Policy::kMeta, adapted.stats));
     results.back().context_episodes = adapted.context_episodes;
@@ -103,6 +110,10 @@ Episode TaskAgent::recordMeta(const MetaPolicy& meta) const {
   checkModel(meta.model, learner_->layout(), "the aggregator");
   Rng rng = evaluationRng();
   return learner_->record(meta.model, rng);
+}
+
+bool TaskAgent::evaluates(int round) const {
+  return round % evaluation_interval_ == 0 || round == rounds_;
 }
 
 // the same draws for every policy and round: differences are the policies', not the dice's

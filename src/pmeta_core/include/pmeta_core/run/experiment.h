@@ -30,11 +30,12 @@ struct ExperimentSettings {
   std::string algorithm = "pmeta";     ///< pmeta, model_averaging, independent or pooled
   std::string learner = "q_learning";  ///< q_learning (tables), dqn or sac (networks)
   std::int64_t seed = 0;
-  int rounds = 10;            ///< C
-  int updates_per_round = 3;  ///< R
-  std::string results_dir;    ///< "" means $ROS_HOME/pmeta, by default ~/.ros/pmeta
-  std::string run_id;         ///< "" means one made of the start time, algorithm and seed
-  double pace = 0;            ///< least seconds between rounds, to watch a fast experiment
+  int rounds = 10;              ///< C
+  int updates_per_round = 3;    ///< R
+  int evaluation_interval = 1;  ///< rounds from one evaluation to the next
+  std::string results_dir;      ///< "" means $ROS_HOME/pmeta, by default ~/.ros/pmeta
+  std::string run_id;           ///< "" means one made of the start time, algorithm and seed
+  double pace = 0;              ///< least seconds between rounds, to watch a fast experiment
   bool publish_trajectories = true;
   int fresh_episodes = 0;  ///< local runner: episodes of the evaluation after the last round
   PersonalSettings personal;
@@ -78,6 +79,10 @@ class Experiment {
     return settings_.algorithm == "pmeta" || settings_.algorithm == "model_averaging";
   }
   bool keepsPersonal() const { return settings_.personal.personal_init == "keep"; }
+  /// Are policies evaluated in this round? Every evaluation_interval-th one, and the last.
+  bool evaluates(int round) const {
+    return round % settings_.evaluation_interval == 0 || round == settings_.rounds;
+  }
   int quorum() const;  ///< updates needed once the deadline has passed
 
   /// How many exploration episodes the meta-policy is evaluated after, ascending; {0} without an

@@ -39,7 +39,8 @@ class RoundBook {
   void closeRound(int round, const std::vector<int>& participants, const std::vector<int>& missing,
                   double seconds);
 
-  /// Rounds that are complete, in order. With `force`, closed rounds come out as they are.
+  /// Rounds that are complete, in order; those that do not evaluate have no rows. With `force`,
+  /// closed rounds come out as they are.
   std::vector<Round> take(bool force = false);
 
   int roundsTaken() const { return next_ - 1; }
@@ -57,11 +58,13 @@ class RoundBook {
     bool hasPersonal(int task) const;
     bool hasMeta(int task, const std::vector<int>& contexts) const;
   };
-  bool isComplete(const Open& open) const;
+  bool isComplete(int round, const Open& open) const;
+  bool evaluates(int round) const;
 
   int num_tasks_;    ///< training tasks
   int total_tasks_;  ///< with the test tasks
   std::vector<int> contexts_;
+  int evaluation_interval_;
   int rounds_;
   bool expects_meta_;
   std::string run_id_;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -16,9 +17,11 @@ class TaskAgent {
   /// What one round of training gives.
   struct RoundResult {
     AuxiliaryUpdate update;
-    TaskReturn personal;
-    double loss = 0;      ///< of the last update
-    double distance = 0;  ///< ||phi - omega_meta|| over the task's own entries
+    std::optional<TaskReturn> personal;  ///< in rounds that evaluate; counts all since the last
+    std::int64_t env_steps = 0;          ///< of this round
+    std::int64_t updates = 0;            ///< of this round
+    double loss = 0;                     ///< of the last update
+    double distance = 0;                 ///< ||phi - omega_meta|| over the task's own entries
   };
 
   /// Called after each update with the number done in this round; false stops training.
@@ -30,11 +33,12 @@ class TaskAgent {
   bool trains() const { return split_ == Split::kTrain; }  ///< a test task only evaluates
   const ModelLayout& layout() const { return learner_->layout(); }
 
-  /// One round from `meta`: reset, R updates, evaluation of the personal policy. Nothing if
-  /// stopped. Throws Error if the meta-policy does not fit.
+  /// One round from `meta`: reset, R updates, and evaluation of the personal policy where
+  /// Experiment::evaluates(). Nothing if stopped. Throws Error if the meta-policy does not fit.
   std::optional<RoundResult> trainRound(const MetaPolicy& meta, const KeepGoing& keep_going = {});
 
-  /// The meta-policy on this task: one return for each of Experiment::contextEpisodes().
+  /// The meta-policy on this task: one return for each of Experiment::contextEpisodes(), or none
+  /// in a round that does not evaluate.
   std::vector<TaskReturn> evaluateMeta(const MetaPolicy& meta) const;
 
   /// A policy on this task, on at least `episodes` episodes that no round evaluates; a meta-policy
@@ -48,6 +52,7 @@ class TaskAgent {
   Episode recordMeta(const MetaPolicy& meta) const;
 
  private:
+  bool evaluates(int round) const;
   Rng evaluationRng() const;
   TaskReturn makeReturn(int round, Policy policy, const ReturnStats& stats) const;
 
@@ -58,6 +63,10 @@ class TaskAgent {
   int updates_per_round_;
   bool keeps_personal_;
   bool sends_personal_;
+  int evaluation_interval_;
+  int rounds_;
+  std::int64_t env_steps_ = 0;  // since the last evaluation
+  std::int64_t updates_ = 0;
   std::unique_ptr<PersonalLearner> learner_;
 };
 
