@@ -6,7 +6,7 @@
 
 namespace pmeta_nodes {
 
-PolicyNode::PolicyNode(const std::string& path) : policy_(path) {
+PolicyNode::PolicyNode(const std::string& path, int task) : policy_(path, task) {
   const std::string description = policy_.description();
   action_.data.resize(static_cast<std::size_t>(policy_.spec().action_size));
   action_pub_ = nh_.advertise<std_msgs::Float64MultiArray>("action", 1);

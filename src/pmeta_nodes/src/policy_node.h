@@ -21,7 +21,7 @@ namespace pmeta_nodes {
 class PolicyNode {
  public:
   /// Throws pmeta::Error if `path` is not a policy file.
-  explicit PolicyNode(const std::string& path);
+  PolicyNode(const std::string& path, int task);
 
  private:
   void onObservation(const std_msgs::Float64MultiArray::ConstPtr& msg);

@@ -13,7 +13,8 @@ constexpr char kHelp[] =
   rosrun pmeta_nodes policy_node _policy:=RUN_FOLDER/policies/task_0.safetensors
 
 private parameters
-  ~policy      policy file of a run (required); nothing else is needed
+  ~policy      policy file of a run (required)
+  ~task        which task to act on; for a meta-policy that is told its task by a one-hot input
 subscribes   observation (std_msgs/Float64MultiArray): as many numbers as the environment's have
 publishes    action (std_msgs/Float64MultiArray): the greedy action, one number if it is discrete;
              /diagnostics
@@ -29,7 +30,7 @@ void act() {
         "which policy? Give the private parameter policy, e.g. "
         "_policy:=RUN_FOLDER/policies/task_0.safetensors.");
   }
-  const pmeta_nodes::PolicyNode node(path);
+  const pmeta_nodes::PolicyNode node(path, ros::NodeHandle("~").param("task", -1));
   ros::spin();
 }
 

@@ -202,7 +202,7 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
 void TaskAgentNode::savePersonal() const {
   try {
     pmeta::saveRunPolicy(experiment_, pmeta::Policy::kPersonal, agent_.task(),
-                         experiment_.settings().rounds, agent_.personal());
+                         experiment_.settings().rounds, agent_.personal(), agent_.taskInput());
   } catch (const pmeta::Error& error) {
     // the others can do without this machine's file
     ROS_ERROR("the personal policy is not kept: %s", error.what());

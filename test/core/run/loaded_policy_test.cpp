@@ -58,9 +58,77 @@ void expectActsAsRecorded(LoadedPolicy& policy, int task) {
       double action = -1;
       const std::size_t at = t * static_cast<std::size_t>(episode.observation_size);
       ASSERT_TRUE(policy.act(&episode.observations[at], &action));
-      EXPECT_EQ(action, episode.actions[t]) << "start " << start << ", step " << t;
+      ASSERT_EQ(action, episode.actions[t]) << "start " << start << ", step " << t;
     }
   }
+}
+
+Experiment point(const std::string& task_encoding) {
+  return Experiment::parse(R"(
+experiment: point
+run_id: run
+results_dir: /tmp/pmeta_unused
+learner: sac
+rounds: 2
+updates_per_round: 20
+personal: {alpha: 0.001, lambda: 15, eta: 0.01}
+sac: {hidden: [12, 10], batch_size: 16, buffer_size: 500, warm_up_steps: 40, context_hidden: [8],
+      latent_size: 2, context_batch: 20, evaluation_episodes: 2, task_encoding: )" +
+                               task_encoding + "}\nenvironment: {name: sparse_point_robot}\n",
+                           "point.yaml");
+}
+
+// two numbers an action
+std::vector<double> actionOf(LoadedPolicy& policy, double x, double y) {
+  const double observation[] = {x, y};
+  std::vector<double> action(2);
+  EXPECT_TRUE(policy.act(observation, action.data()));
+  return action;
+}
+
+TEST(LoadedPolicy, ActsAsTheActorOfItsTask) {
+  const Trained run(point("one_hot"));
+  const Experiment& experiment = run.experiment;
+  const LocalResult local = runLocally(experiment);
+  const std::string meta = run.policies + "meta.safetensors";
+  LoadedPolicy third(meta, 3), first(meta, 0);
+  EXPECT_NE(actionOf(third, 0.1, 0.2), actionOf(first, 0.1, 0.2)) << "the task tells";
+  const auto learner = experiment.makeLearner(3);
+  Rng rng(0, 0, Stream::kMeasure);
+  const Episode episode = learner->record(local.meta, rng);
+  ASSERT_EQ(episode.action_size, 2);
+  for (std::size_t t = 0; t + 1 < episode.rewards.size(); ++t) {
+    EXPECT_EQ(actionOf(third, episode.observations[2 * t], episode.observations[2 * t + 1]),
+              (std::vector<double>{episode.actions[2 * t], episode.actions[2 * t + 1]}));
+  }
+  // a personal policy needs not be told
+  LoadedPolicy personal(run.policies + "task_3.safetensors");
+  EXPECT_EQ(personal.task(), 3);
+  actionOf(personal, 0.1, 0.2);
+  EXPECT_THAT(errorOf([&] { LoadedPolicy{meta}; }),
+              HasSubstr("is a meta-policy that must be told its task: choose one from 0 to 9."));
+  EXPECT_THAT(errorOf([&] { LoadedPolicy(meta, 10); }), HasSubstr("choose one from 0 to 9."));
+}
+
+TEST(LoadedPolicy, ActsOnTheLatentVectorOfItsFile) {
+  const Trained run(point("inference"));
+  const std::string path = run.policies + "task_1.safetensors";
+  PolicyFile file = loadPolicy(path);
+  ASSERT_EQ(file.metadata.count("task_input"), 1u);
+  LoadedPolicy as_trained(path);
+  file.metadata["task_input"] = "5,-5";
+  savePolicy(path, file.model, file.metadata);
+  LoadedPolicy elsewhere(path);
+  EXPECT_NE(actionOf(as_trained, 0.1, 0.2), actionOf(elsewhere, 0.1, 0.2));
+  for (const std::string bad : {"5", "5,-5,1", "5,x", "5,nan", ""}) {
+    file.metadata["task_input"] = bad;
+    savePolicy(path, file.model, file.metadata);
+    EXPECT_THAT(errorOf([&] { LoadedPolicy{path}; }),
+                HasSubstr("has a task_input that is not of 2 numbers."))
+        << bad;
+  }
+  LoadedPolicy meta(run.policies + "meta.safetensors");
+  actionOf(meta, 0.1, 0.2);
 }
 
 TEST(LoadedPolicy, ActsAsTheTableInMemory) {

@@ -249,7 +249,8 @@ int evaluate(const Arguments& arguments) {
   if (arguments.words.size() != 1) {
     throw Error("evaluate needs one policy file, e.g. RUN_FOLDER/policies/task_0.safetensors.");
   }
-  const pmeta::LoadedPolicy policy(arguments.words[0]);
+  // a meta-policy that is told its task is told each one in its turn
+  const pmeta::LoadedPolicy policy(arguments.words[0], std::max(arguments.task, 0));
   const Experiment& experiment = policy.experiment();
   if (arguments.task >= experiment.totalTasks()) {
     throw Error("--task is " + std::to_string(arguments.task) + " but must be from 0 to " +
@@ -259,9 +260,11 @@ int evaluate(const Arguments& arguments) {
   const int only = arguments.task < 0 ? policy.task() : arguments.task;
   for (int task = 0; task < experiment.totalTasks() && !g_stop; ++task) {
     if (only >= 0 && task != only) continue;
+    // what a personal policy knew of its task went with its agent: it explores anew
+    const bool explores = experiment.contextEpisodes().size() > 1;
+    const pmeta::Policy kind = explores ? pmeta::Policy::kMeta : policy.policy();
     const pmeta::ReturnStats stats =
-        pmeta::TaskAgent(experiment, task)
-            .evaluateFresh(policy.policy(), policy.model(), arguments.episodes);
+        pmeta::TaskAgent(experiment, task).evaluateFresh(kind, policy.model(), arguments.episodes);
     std::printf("task %d %s  return %s +- %s over %d episodes\n", task,
                 experiment.family().taskName(task).c_str(), shortNumber(stats.mean).c_str(),
                 shortNumber(stats.std).c_str(), stats.episodes);

@@ -225,6 +225,7 @@ void Experiment::applyAlgorithm() {
   if (e.personal.lambda != 0) changes.push_back("personal.lambda to 0");
   if (e.personal.personal_init != init) changes.push_back("personal.personal_init to " + init);
   e.personal.lambda = 0;
+  e.personal.lambda_actor = e.personal.lambda_critic = e.personal.lambda_encoder = -1;
   e.personal.personal_init = init;
   if (!evaluatesMeta()) {
     if (e.aggregation.beta != 0) changes.push_back("aggregation.beta to 0");

@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <locale>
+#include <optional>
+#include <sstream>
 #include <vector>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/learn/sac_networks.h"
 #include "pmeta_core/nn/aligned.h"
 #include "pmeta_core/nn/mlp.h"
 
@@ -33,22 +37,69 @@ int numberOf(const PolicyFile& file, const std::string& path, const std::string&
 
 }  // namespace
 
-struct LoadedPolicy::Network {
-  Network(Mlp network, const std::vector<float>& values)
-      : mlp(std::move(network)),
-        workspace(mlp, 1),
-        parameters(values.begin(), values.end()),
-        observation(mlp.inputs()) {}
+/// Networks that act on an observation as floats.
+class LoadedPolicy::Network {
+ public:
+  virtual ~Network() = default;
+  virtual std::vector<Block> blocks() const = 0;
+  virtual void act(const float* parameters, const float* observation, double* action) = 0;
 
-  Mlp mlp;
-  MlpWorkspace workspace;
-  AlignedFloats parameters;
-  std::vector<float> observation;
+  bool actOn(const double* observation, double* action) {
+    for (std::size_t k = 0; k < observation_.size(); ++k) {
+      observation_[k] = static_cast<float>(observation[k]);
+      if (!std::isfinite(observation_[k])) return false;
+    }
+    act(parameters_.data(), observation_.data(), action);
+    return true;
+  }
+
+  void load(const std::vector<float>& values, std::size_t observation_size) {
+    parameters_.assign(values.begin(), values.end());
+    observation_.resize(observation_size);
+  }
+
+ private:
+  AlignedFloats parameters_;
+  std::vector<float> observation_;
 };
 
-LoadedPolicy::LoadedPolicy(const std::string& path) : LoadedPolicy(path, loadPolicy(path)) {}
+class LoadedPolicy::QNetwork : public Network {
+ public:
+  explicit QNetwork(MlpSpec spec) : mlp_(std::move(spec)) {}
+  std::vector<Block> blocks() const override { return mlp_.blocks(); }
+  void act(const float* parameters, const float* observation, double* action) override {
+    // only now are its sizes known to be those of the file
+    if (!workspace_) workspace_.emplace(mlp_, 1);
+    const float* values = mlp_.forward(parameters, observation, 1, *workspace_);
+    action[0] = static_cast<double>(std::max_element(values, values + mlp_.outputs()) - values);
+  }
 
-LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file)
+ private:
+  Mlp mlp_;
+  std::optional<MlpWorkspace> workspace_;
+};
+
+class LoadedPolicy::Actor : public Network {
+ public:
+  Actor(const EnvSpec& spec, const SacSettings& settings, int num_tasks,
+        std::vector<float> task_input)
+      : networks_(spec, settings, num_tasks), task_input_(std::move(task_input)) {}
+  std::vector<Block> blocks() const override { return networks_.blocks(); }
+  void act(const float* parameters, const float* observation, double* action) override {
+    if (!workspace_) workspace_.emplace(networks_, 1);
+    networks_.greedyActions(parameters, observation, 1, task_input_.data(), *workspace_, action);
+  }
+
+ private:
+  SacNetworks networks_;
+  std::vector<float> task_input_;
+  std::optional<SacNetworks::ActorWorkspace> workspace_;
+};
+
+LoadedPolicy::LoadedPolicy(const std::string& path, int as_task)
+    : LoadedPolicy(path, loadPolicy(path), as_task) {}
+
+LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file, int as_task)
     : experiment_(Experiment::parse(textOf(file, path, "settings"), "the policy file " + path)),
       model_(std::move(file.model)) {
   round_ = numberOf(file, path, "round", experiment_.settings().rounds);
@@ -64,7 +115,6 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file)
   // the layout that the settings give is known before anything of its size is allocated
   std::vector<Block> blocks;
   Precision precision = Precision::kFloat32;
-  std::unique_ptr<Mlp> mlp;
   table_ = experiment_.settings().learner == "q_learning"
                ? dynamic_cast<const TabularEnv*>(env_.get())
                : nullptr;
@@ -74,8 +124,12 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file)
                {static_cast<std::size_t>(table_->numStates()),
                 static_cast<std::size_t>(table_->numActions())}}};
   } else if (experiment_.settings().learner == "dqn" && spec().num_actions > 0) {
-    mlp = std::make_unique<Mlp>(dqnNetwork(spec(), experiment_.settings().dqn));
-    blocks = mlp->blocks();
+    network_ = std::make_unique<QNetwork>(dqnNetwork(spec(), experiment_.settings().dqn));
+    blocks = network_->blocks();
+  } else if (experiment_.settings().learner == "sac" && spec().num_actions == 0) {
+    network_ = std::make_unique<Actor>(spec(), experiment_.settings().sac, experiment_.numTasks(),
+                                       taskInput(file, path, as_task));
+    blocks = network_->blocks();
   } else {
     throw Error("the policy file " + path + " is of learner '" + experiment_.settings().learner +
                 "' on '" + spec().name + "', which cannot act from a file.");
@@ -83,7 +137,41 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file)
   if (model_.layout != ModelLayout(precision, std::move(blocks))) {
     throw Error("the policy file " + path + " has parameters that do not fit its own settings.");
   }
-  if (mlp != nullptr) network_ = std::make_unique<Network>(std::move(*mlp), model_.floats());
+  if (network_ != nullptr) {
+    network_->load(model_.floats(), static_cast<std::size_t>(spec().observation_size));
+  }
+}
+
+std::vector<float> LoadedPolicy::taskInput(const PolicyFile& file, const std::string& path,
+                                           int as_task) const {
+  const SacSettings& sac = experiment_.settings().sac;
+  if (sac.task_encoding == "none") return {};
+  if (sac.task_encoding == "one_hot") {
+    const int task = policy_ == Policy::kPersonal ? task_ : as_task;
+    if (task < 0 || task >= experiment_.numTasks()) {
+      throw Error("the policy file " + path +
+                  " is a meta-policy that must be told its task: choose one from 0 to " +
+                  std::to_string(experiment_.numTasks() - 1) + ".");
+    }
+    return oneHot(task, experiment_.numTasks());
+  }
+  const auto size = static_cast<std::size_t>(sac.context.latent_size);
+  if (policy_ == Policy::kMeta) return std::vector<float>(size, 0.0f);  // the prior's mean
+  std::istringstream text(textOf(file, path, "task_input"));
+  std::vector<float> latent;
+  for (std::string word; std::getline(text, word, ',');) {
+    std::istringstream number(word);
+    number.imbue(std::locale::classic());
+    float value = 0;
+    number >> value;
+    if (!number || !number.eof() || !std::isfinite(value)) break;
+    latent.push_back(value);
+  }
+  if (latent.size() != size) {
+    throw Error("the policy file " + path + " has a task_input that is not of " +
+                std::to_string(size) + " numbers.");
+  }
+  return latent;
 }
 
 LoadedPolicy::~LoadedPolicy() = default;
@@ -98,7 +186,7 @@ std::string LoadedPolicy::description() const {
 
 bool LoadedPolicy::act(const double* observation, double* action) {
   return table_ != nullptr ? actFromTable(observation, action)
-                           : actFromNetwork(observation, action);
+                           : network_->actOn(observation, action);
 }
 
 bool LoadedPolicy::actFromTable(const double* observation, double* action) const {
@@ -112,19 +200,6 @@ bool LoadedPolicy::actFromTable(const double* observation, double* action) const
   const std::size_t row = static_cast<std::size_t>(state) * static_cast<std::size_t>(n);
   if (!model_.isPresent(row)) return false;
   action[0] = greedyAction(&model_.doubles()[row], n);
-  return true;
-}
-
-bool LoadedPolicy::actFromNetwork(const double* observation, double* action) {
-  Network& network = *network_;
-  for (std::size_t k = 0; k < network.observation.size(); ++k) {
-    network.observation[k] = static_cast<float>(observation[k]);
-    if (!std::isfinite(network.observation[k])) return false;
-  }
-  const float* values = network.mlp.forward(network.parameters.data(), network.observation.data(),
-                                            1, network.workspace);
-  action[0] =
-      static_cast<double>(std::max_element(values, values + network.mlp.outputs()) - values);
   return true;
 }
 

@@ -13,7 +13,8 @@ void savePolicies(const Experiment& experiment, const MetaPolicy& meta,
   saveRunPolicy(experiment, Policy::kMeta, -1, meta.round, meta.model);
   for (const TaskAgent& agent : agents) {
     if (!agent.trains()) continue;
-    saveRunPolicy(experiment, Policy::kPersonal, agent.task(), meta.round, agent.personal());
+    saveRunPolicy(experiment, Policy::kPersonal, agent.task(), meta.round, agent.personal(),
+                  agent.taskInput());
   }
 }
 

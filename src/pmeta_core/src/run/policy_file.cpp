@@ -275,7 +275,8 @@ PolicyFile loadPolicy(const std::string& path) {
 }
 
 std::map<std::string, std::string> policyMetadata(const Experiment& experiment, Policy policy,
-                                                  int task, int round) {
+                                                  int task, int round,
+                                                  const std::vector<float>& task_input) {
   const ExperimentSettings& settings = experiment.settings();
   const EnvSpec spec = experiment.family().make(policy == Policy::kMeta ? 0 : task)->spec();
   std::map<std::string, std::string> metadata = {
@@ -288,16 +289,21 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment, 
       {"num_actions", std::to_string(spec.num_actions)},
       {"settings", experiment.yaml()}};
   if (policy == Policy::kPersonal) metadata["task"] = std::to_string(task);
+  if (!task_input.empty()) {
+    std::vector<std::string> numbers;
+    for (const float value : task_input) numbers.push_back(formatNumber(value));
+    metadata["task_input"] = join(numbers, ",");
+  }
   return metadata;
 }
 
 void saveRunPolicy(const Experiment& experiment, Policy policy, int task, int round,
-                   const Model& model) {
+                   const Model& model, const std::vector<float>& task_input) {
   const std::string dir = experiment.runDir() + "/policies";
   requireWritable(dir);
   const std::string file = policy == Policy::kMeta ? "meta" : "task_" + std::to_string(task);
   savePolicy(dir + "/" + file + ".safetensors", model,
-             policyMetadata(experiment, policy, task, round));
+             policyMetadata(experiment, policy, task, round, task_input));
 }
 
 }  // namespace pmeta

@@ -59,6 +59,13 @@ class PersonalLearner {
   /// Return of `policy` on this task, greedy, by the protocol of the environment.
   virtual ReturnStats evaluate(const Model& policy, Rng& rng) const = 0;
 
+  /// What tells `policy` the task beside the observations, as far as this learner knows; empty if
+  /// nothing does.
+  virtual std::vector<float> taskInput(const Model& policy) const {
+    static_cast<void>(policy);
+    return {};
+  }
+
   /// Returns of a meta-policy on this task, for each number of exploration episodes that the
   /// learner's settings name, ascending. A learner without an inference network has no use for any:
   /// one return.

@@ -47,6 +47,7 @@ class SacPersonalLearner : public PersonalLearner {
   /// only. The task input is this task's one-hot vector, or the mean of z that the policy's own
   /// encoder infers from the context this learner has collected.
   ReturnStats evaluate(const Model& policy, Rng& rng) const override;
+  std::vector<float> taskInput(const Model& policy) const override;
   Episode record(const Model& policy, Rng& rng) const override;
 
   /// Returns of `policy` as at test time: it knows nothing of this learner's context but explores
@@ -57,7 +58,6 @@ class SacPersonalLearner : public PersonalLearner {
   const ProximalAdam& optimizer() const { return optimizer_; }
 
  private:
-  std::vector<float> taskInput(const Model& policy) const;
   BatchPolicy greedy(const Model& policy, const std::vector<float>& task_input) const;
 
   void setLambda(std::size_t offset, const Mlp& network, double lambda);

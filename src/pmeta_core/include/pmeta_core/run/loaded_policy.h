@@ -15,9 +15,11 @@ namespace pmeta {
 /// A trained policy from a file, ready to act; the file is all it needs.
 class LoadedPolicy {
  public:
-  /// Reads the file and rebuilds its experiment. Throws Error if the file is none of a policy, or
-  /// its parameters do not fit its own settings.
-  explicit LoadedPolicy(const std::string& path);
+  /// Reads the file and rebuilds its experiment. `as_task` is for a meta-policy whose networks are
+  /// told the task by a one-hot input: which training task it shall act on. Throws Error if the
+  /// file is none of a policy, its parameters do not fit its own settings, or it must be told a
+  /// task.
+  explicit LoadedPolicy(const std::string& path, int as_task = -1);
   ~LoadedPolicy();
   LoadedPolicy(LoadedPolicy&&) noexcept;
 
@@ -31,16 +33,20 @@ class LoadedPolicy {
   std::string description() const;
 
   /// The greedy action (spec().action_size numbers) of an observation (spec().observation_size
-  /// numbers); the lowest of equally good ones. False, and no action, if the observation is not
-  /// finite or, for a table, of no state that the policy has values of. Allocates nothing.
+  /// numbers); the lowest of equally good discrete ones. A policy with an inference network acts on
+  /// the latent vector that its file holds: a meta-policy's is that before any exploration. False,
+  /// and no action, if the observation is not finite or, for a table, of no state that the policy
+  /// has values of. Allocates nothing.
   bool act(const double* observation, double* action);
 
  private:
-  struct Network;
+  class Network;
+  class QNetwork;
+  class Actor;
 
-  LoadedPolicy(const std::string& path, PolicyFile file);
+  LoadedPolicy(const std::string& path, PolicyFile file, int as_task);
   bool actFromTable(const double* observation, double* action) const;
-  bool actFromNetwork(const double* observation, double* action);
+  std::vector<float> taskInput(const PolicyFile& file, const std::string& path, int as_task) const;
 
   Experiment experiment_;
   Model model_;

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/run/experiment.h"
@@ -32,14 +33,16 @@ void savePolicy(const std::string& path, const Model& model,
 PolicyFile loadPolicy(const std::string& path);
 
 /// What a loader needs to rebuild and use a policy: "environment", "learner", "policy" (personal or
-/// meta), "task" (of a personal policy), "round", "run_id", "observation_size", "num_actions" and
-/// "settings", the effective settings as YAML.
+/// meta), "task" (of a personal policy), "round", "run_id", "observation_size", "num_actions",
+/// "task_input" (numbers with commas between, if there are any) and "settings", the effective
+/// settings as YAML.
 std::map<std::string, std::string> policyMetadata(const Experiment& experiment, Policy policy,
-                                                  int task, int round);
+                                                  int task, int round,
+                                                  const std::vector<float>& task_input = {});
 
 /// Writes a policy into the run's folder, as policies/meta.safetensors or
 /// policies/task_<i>.safetensors (`task` does not matter to a meta-policy). Throws Error.
 void saveRunPolicy(const Experiment& experiment, Policy policy, int task, int round,
-                   const Model& model);
+                   const Model& model, const std::vector<float>& task_input = {});
 
 }  // namespace pmeta

@@ -46,6 +46,8 @@ class TaskAgent {
   ReturnStats evaluateFresh(Policy kind, const Model& policy, int episodes) const;
 
   const Model& personal() const { return learner_->personal(); }
+  /// What tells the personal policy its task beside the observations; empty if nothing does.
+  std::vector<float> taskInput() const { return learner_->taskInput(learner_->personal()); }
 
   /// One greedy episode, from the same start whatever the policy and round.
   Episode recordPersonal() const;
