@@ -214,7 +214,7 @@ def test_the_newer_of_two_differing_runs_counts(tmp_path):
 @pytest.mark.parametrize("change, line, words", [
     (lambda t: t[:-1], 17, "truncated"),
     (lambda t: t[:-20], 17, "truncated"),
-    (lambda t: t.replace(",1.5,15,100,", ",1.5,15,", 1), 2, "9 fields instead of 10"),
+    (lambda t: t.replace(",1.5,15,100,", ",1.5,15,", 1), 2, "10 fields instead of 11"),
     (lambda t: t.replace("1,1,train", "1,x,train", 1), 3, "task is 'x'"),
     (lambda t: t.replace(",1.5,15,", ",nan,15,", 1), 2, "return_std is 'nan'"),
     (lambda t: t.replace("train", "trial", 1), 2, "'trial'"),
@@ -491,7 +491,7 @@ def test_seeds_without_fresh_episodes_are_named(tmp_path):
     (lambda t: t.replace("personal,1,1", "personal,0,0", 1), "line 3 repeats"),
     (lambda t: t.replace("last,3,meta,-1,1", "best,3,meta,-1,7", 1), "out of range"),
     (lambda t: t[:t.rindex("best")], "has the meta returns (best) of 1 of 2 tasks"),
-    (lambda t: t.replace(",2.5,", ",", 1), "7 fields instead of 8"),
+    (lambda t: t.replace(",2.5,", ",", 1), "8 fields instead of 9"),
 ])
 def test_malformed_fresh_returns_are_refused(tmp_path, change, words):
     path = edit(write_run(tmp_path, fresh=100), "final.csv", change)

@@ -130,7 +130,7 @@ def test_tables_show_the_numbers_of_the_csv_files(folders, written):
     values = []
     for folder in folders["pmeta"]:
         with open(os.path.join(folder, "final.csv")) as file:
-            values += [float(line.split(",")[5]) for line in file
+            values += [float(line.split(",")[6]) for line in file
                        if line.startswith("last,3,meta,-1,1,")]
     assert len(values) == 3 and last[5] == spread(values)
     assert len(runs) == 1 + 9
