@@ -7,9 +7,8 @@ import sys
 
 import pytest
 
-from run_folders import curve, fails, plot, write_run
+from run_folders import Kept, curve, fails, plot, write_run
 import pmeta_bags as pb
-import pmeta_drawing as pd
 import pmeta_figures as pf
 import pmeta_runs as pr
 
@@ -22,9 +21,17 @@ HEADER_DEFINITION = "\n".join(["", "=" * 80, "MSG: std_msgs/Header", "uint32 seq
 
 
 @pytest.fixture(scope="module")
-def message_class():
+def definition():
     with open(os.path.join(MSG, "TaskReturn.msg")) as file:
-        definition = file.read() + HEADER_DEFINITION
+        return file.read() + HEADER_DEFINITION
+
+
+@pytest.fixture(scope="module")
+def message_class(definition):
+    return generated(definition)
+
+
+def generated(definition):
     return genpy.dynamic.generate_dynamic("pmeta_msgs/TaskReturn", definition)[
         "pmeta_msgs/TaskReturn"]
 
@@ -38,6 +45,9 @@ def write_bag(path, folder, message_class, keep=lambda row: True, run_id="r", tw
             message = message_class(run_id=run_id, task=int(row["task"]), round=int(row["round"]),
                                     policy_name=row["policy"], split_name=row["split"],
                                     return_mean=float(row["return_mean"]))
+            # older messages have no such field
+            if hasattr(message, "context_episodes"):
+                message.context_episodes = int(row["context_episodes"])
             bag.write("/pmeta/returns", message, genpy.Time(i + 1))
             if twice:
                 message.return_mean = 1e6
@@ -57,18 +67,40 @@ def test_curves_of_a_bag_equal_those_of_rounds_csv(tmp_path, message_class):
 
 
 def test_the_figure_shows_both_policies(tmp_path, message_class):
-    class Kept(pd.Figures):
-        def save(self, figure, name):
-            self.written.append((figure, name))
-
     folder = write_run(tmp_path, seed=3)
-    kept = Kept("", ())
+    kept = Kept()
     [run] = pb.read_bag(write_bag(tmp_path / "r.bag", folder, message_class))
     pf.bag_curves(run, pb.name_of(run), kept)
     [(figure, name)] = kept.written
     assert name == "r_learning_curves"
     drawn = {line.get_label(): list(line.get_ydata()) for line in figure.axes[0].lines}
     assert drawn == {"MP": list(run.curves["meta"]), "PP": list(run.curves["personal"])}
+
+
+def test_test_tasks_and_adaptation_equal_those_of_rounds_csv(tmp_path, message_class):
+    folder = write_run(tmp_path, seed=3, contexts=(0, 2), tests=2)
+    [run] = pb.read_bag(write_bag(tmp_path / "r.bag", folder, message_class))
+    [of_folder] = pr.load_runs([folder])
+    assert run.curves.keys() == of_folder.curves.keys()
+    for key in run.curves:
+        assert list(run.curves[key]) == list(of_folder.curves[key])
+    assert list(run.curves["meta"]) == pytest.approx(curve(folder, "meta", "train", 2), rel=1e-14)
+    kept = Kept()
+    pf.bag_curves(run, "r", kept)
+    drawn = {line.get_label(): list(line.get_ydata()) for line in kept.written[0][0].axes[0].lines}
+    assert drawn == {"MP": list(run.curves["meta"]), "PP": list(run.curves["personal"]),
+                     "MP before adaptation": list(run.curves["train", 0]),
+                     "MP, test tasks, after 0 episodes": list(run.curves["test", 0]),
+                     "MP, test tasks, after 2 episodes": list(run.curves["test", 2])}
+
+
+def test_older_bags_lack_context_episodes(tmp_path, definition):
+    older = generated(definition.replace("uint32 context_episodes", ""))
+    assert not hasattr(older(), "context_episodes")
+    folder = write_run(tmp_path, seed=3)
+    [run] = pb.read_bag(write_bag(tmp_path / "r.bag", folder, older))
+    for policy in ("personal", "meta"):
+        assert list(run.curves[policy]) == pytest.approx(curve(folder, policy), rel=1e-14)
 
 
 def test_figures_of_a_bag_stand_beside_it(tmp_path, message_class):

@@ -10,13 +10,14 @@ import sys
 
 import pytest
 
-from run_folders import (HEADER, SCRIPTS, curve, edit, fails, fresh_mean, groups_of, plot, summary,
-                         write_run)
+from run_folders import (HEADER, SCRIPTS, Kept, curve, edit, fails, fresh_mean, groups_of,
+                         make_older, plot, rows_of, summary, write_run)
 import pmeta_convergence as pc
 import pmeta_drawing as pd
 import pmeta_figures as pf
 import pmeta_runs as pr
 import pmeta_tables as pt
+import pmeta_unseen as pu
 
 PLOT = os.path.join(SCRIPTS, "plot.py")
 
@@ -157,7 +158,7 @@ def test_numbers_in_exponent_form_are_numbers(tmp_path):
 
 
 def test_curves_show_the_default_strength(tmp_path, sweep):
-    pmeta = pf.pmeta_only(groups_of(tmp_path)["grid"])
+    pmeta = pr.pmeta_only(groups_of(tmp_path)["grid"])
     assert pr.reference(pmeta).settings["personal.lambda"] == 10
     assert pr.reference([g for g in pmeta if g.settings["personal.lambda"] != 10]).label in (
         "pMeta-RL λ=1", "pMeta-RL λ=50")
@@ -214,12 +215,15 @@ def test_the_newer_of_two_differing_runs_counts(tmp_path):
 @pytest.mark.parametrize("change, line, words", [
     (lambda t: t[:-1], 17, "truncated"),
     (lambda t: t[:-20], 17, "truncated"),
-    (lambda t: t.replace(",1.5,15,100,", ",1.5,15,", 1), 2, "9 fields instead of 10"),
+    (lambda t: t.replace(",1.5,15,100,", ",1.5,15,", 1), 2, "10 fields instead of 11"),
     (lambda t: t.replace("1,1,train", "1,x,train", 1), 3, "task is 'x'"),
     (lambda t: t.replace(",1.5,15,", ",nan,15,", 1), 2, "return_std is 'nan'"),
     (lambda t: t.replace("train", "trial", 1), 2, "'trial'"),
     (lambda t: t.replace("1,0,train", "0,0,train", 1), 2, "out of range"),
     (lambda t: t.replace("1,1,train", "1,0,train", 1), 3, "repeats round 1, task 0"),
+    (lambda t: t.replace("train,meta,0", "train,meta,-1", 1), 4, "context_episodes -1"),
+    (lambda t: t.replace("train,pers", "test,pers", 1), 2, "neither adapts nor has test tasks"),
+    (lambda t: t.replace("personal,0", "personal,2", 1), 2, "neither adapts nor has test tasks"),
     (lambda t: t.replace("round,", "turn,"), 1, "header"),
     (lambda t: "", 1, "empty"),
     (lambda t: t + "\n", 18, "1 fields"),
@@ -490,13 +494,235 @@ def test_seeds_without_fresh_episodes_are_named(tmp_path):
     (lambda t: t.replace("personal,1,1", "personal,1,2", 1), "line 3: task 2"),
     (lambda t: t.replace("personal,1,1", "personal,0,0", 1), "line 3 repeats"),
     (lambda t: t.replace("last,3,meta,-1,1", "best,3,meta,-1,7", 1), "out of range"),
+    (lambda t: t.replace("1,1,train", "1,1,trial", 1), "split is 'trial'"),
+    (lambda t: t.replace("1,1,train", "1,1,test", 1), "line 3: task 1 (test)"),
+    (lambda t: t.replace("last", "own_best", 1).replace("own_best,3,personal,0,0",
+                                                       "own_best,3,personal,0,1"),
+     "line 2: own_best is of a personal policy on its own task"),
     (lambda t: t[:t.rindex("best")], "has the meta returns (best) of 1 of 2 tasks"),
-    (lambda t: t.replace(",2.5,", ",", 1), "7 fields instead of 8"),
+    (lambda t: t.replace(",2.5,", ",", 1), "8 fields instead of 9"),
 ])
 def test_malformed_fresh_returns_are_refused(tmp_path, change, words):
     path = edit(write_run(tmp_path, fresh=100), "final.csv", change)
     message = fails(tmp_path)
     assert path in message and words in message
+
+
+@pytest.fixture
+def adapting(tmp_path):
+    """Folders of seeds 0, 1, 2: test tasks, and exploration episodes to adapt from."""
+    return [write_run(tmp_path, seed=s, contexts=(0, 1, 3), tests=3, fresh=100, own_best=True,
+                      learner="sac") for s in range(3)]
+
+
+def lines_of(axis):
+    """{label: (x, y)} of what the legend names."""
+    return {line.get_label(): (list(line.get_xdata()), list(line.get_ydata()))
+            for line in axis.lines if not line.get_label().startswith("_")}
+
+
+def over_seeds(folders, *arguments, **named):
+    """Mean over seeds of a curve, straight from the files."""
+    return [statistics.mean(v) for v in zip(*(curve(f, *arguments, **named) for f in folders))]
+
+
+def test_mp_is_that_after_adaptation(tmp_path, adapting):
+    plot(tmp_path, "--out", tmp_path / "out", "--format", "png", "--what", "curves")
+    row = summary(tmp_path / "out")["pMeta-RL λ=10"]
+    for name, split, measure, pick in (("mp_last", "train", "last", lambda c: c[-1]),
+                                       ("mp_auc", "train", "auc", statistics.mean),
+                                       ("mp_best", "train", "best", max),
+                                       ("mp_test_last", "test", "last", lambda c: c[-1])):
+        values = [pick(curve(folder, "meta", split, 3)) for folder in adapting]
+        assert float(row[name + "_mean"]) == pytest.approx(statistics.mean(values)), measure
+        assert float(row[name + "_std"]) == pytest.approx(statistics.stdev(values)), measure
+    values = [curve(folder, "meta", "train", 0)[-1] for folder in adapting]
+    assert float(row["mp_last_mean"]) != pytest.approx(statistics.mean(values))
+
+
+def test_curves_before_adaptation_and_on_test_tasks(tmp_path, adapting):
+    kept = Kept()
+    pf.learning_curves("grid", groups_of(tmp_path)["grid"], kept, "")
+    [(figure, _)] = kept.written
+    lines = lines_of(figure.axes[0])
+    assert list(lines) == ["MP, pMeta-RL λ=10", "PP, pMeta-RL λ=10", "MP before adaptation",
+                           "MP, test tasks, after 0 episodes", "MP, test tasks, after 1 episode",
+                           "MP, test tasks, after 3 episodes"]
+    for label, arguments in (("MP, pMeta-RL λ=10", ("meta", "train", 3)),
+                             ("MP before adaptation", ("meta", "train", 0)),
+                             ("MP, test tasks, after 0 episodes", ("meta", "test", 0)),
+                             ("MP, test tasks, after 1 episode", ("meta", "test", 1)),
+                             ("MP, test tasks, after 3 episodes", ("meta", "test", 3))):
+        assert lines[label] == ([1, 2, 3, 4], pytest.approx(over_seeds(adapting, *arguments)))
+
+
+def test_unseen_tasks_show_what_the_files_say(tmp_path, adapting):
+    kept = Kept()
+    pu.draw_unseen(groups_of(tmp_path), kept)
+    [(figure, name)] = kept.written
+    assert name == "grid_unseen_tasks"
+    curves, tasks = figure.axes
+    labels = {"MP, %s tasks, after %d episode%s" % (word, count, "" if count == 1 else "s"):
+              (split, count) for word, split in (("training", "train"), ("test", "test"))
+              for count in (0, 1, 3)}
+    lines = lines_of(curves)
+    assert list(lines) == list(labels)
+    for label, key in labels.items():
+        assert lines[label][1] == pytest.approx(over_seeds(adapting, "meta", *key))
+    styles = [(line.get_color(), line.get_linestyle()) for line in curves.lines]
+    assert len(set(styles)) == 6 and len(set(style for _, style in styles)) == 3
+    edges = curves.collections[-1].get_paths()[0].vertices
+    last = [curve(folder, "meta", "test", 3)[-1] for folder in adapting]
+    assert max(y for x, y in edges if x == 4) == pytest.approx(
+        statistics.mean(last) + statistics.stdev(last))
+    # the last round: before and after, training and test tasks
+    points = lines_of(tasks)
+    assert list(points) == [label for label, key in labels.items() if key[1] != 1]
+    for label, (values, places) in points.items():
+        rows = [[r for r in rows_of(folder, "meta", *labels[label]) if r["round"] == "4"]
+                for folder in adapting]
+        assert values == pytest.approx([statistics.mean(float(r["return_mean"]) for r in of_task)
+                                        for of_task in zip(*rows)])
+        assert [round(y) for y in places] == [int(r["task"]) for r in rows[0]]
+    assert [text.get_text().replace("\xa0", " ") for text in tasks.get_yticklabels()] == [
+        "zeta 3", "zeta 3.5", "test: zeta 4", "test: zeta 4.5", "test: zeta 5"]
+
+
+def test_unseen_tasks_are_drawn_only_where_there_are_any(tmp_path, adapting):
+    write_run(tmp_path, "independent", experiment="other")
+    write_run(tmp_path, experiment="tests", tests=2)
+    _, err = plot(tmp_path, "--what", "unseen", "--format", "png", "--out", tmp_path / "out")
+    assert err == ""
+    assert [os.path.join(os.path.basename(folder), name)
+            for folder, _, names in sorted(os.walk(str(tmp_path / "out"))) for name in names
+            if "unseen" in name] == ["grid/grid_unseen_tasks.png", "tests/tests_unseen_tasks.png"]
+    # nothing adapts there
+    kept = Kept()
+    pu.draw_unseen({"tests": groups_of(tmp_path)["tests"]}, kept)
+    assert list(lines_of(kept.written[0][0].axes[0])) == ["MP, training tasks", "MP, test tasks"]
+    assert "nothing to draw for unseen" in fails(tmp_path / "other", "--what", "unseen")
+
+
+def test_fresh_returns_on_test_tasks_and_of_own_best_policies(tmp_path, adapting):
+    out, err = plot(tmp_path, "--format", "png", "--out", tmp_path / "out")
+    row = summary(tmp_path / "out")["pMeta-RL λ=10"]
+    for column, arguments in (("pp_fresh_own_best", ("own_best", "personal")),
+                              ("pp_fresh_best", ("best", "personal")),
+                              ("mp_fresh_best", ("best", "meta")),
+                              ("mp_test_fresh_best", ("best", "meta", True, "test")),
+                              ("mp_test_fresh_last", ("last", "meta", True, "test"))):
+        values = [fresh_mean(folder, *arguments) for folder in adapting]
+        assert float(row[column + "_mean"]) == pytest.approx(statistics.mean(values))
+        assert float(row[column + "_std"]) == pytest.approx(statistics.stdev(values))
+    head, pp, mp, tests = [re.split(" {2,}", line.strip()) for line in
+                           out.split("best returns\n")[1].split("\n")[:4]]
+    assert head[2:] == ["best", "fresh (best)", "fresh (own best)", "fresh (last)"]
+    own = "%.2f ± %.2f" % tuple(float(row["pp_fresh_own_best_" + s]) for s in ("mean", "std"))
+    assert pp[4] == own and mp[3] == "-"
+    assert tests[:2] == ["MP on test tasks", "-"] and tests[3] == "-"
+    assert "best on its own task" in out and "MP test last" in out and err == ""
+    assert "MP is after adaptation" in out
+    tex = (tmp_path / "out/best_returns.tex").read_text(encoding="utf-8")
+    assert "best & fresh & fresh, own best" in tex and "episodes; own best: each" in tex
+    assert own.replace("±", "\\pm") in table_row(tex, ", PP &")
+    with open(str(tmp_path / "out/tasks_last.csv"), encoding="utf-8") as file:
+        tests = [r for r in csv.DictReader(file)
+                 if (r["policies"], r["snapshot"]) == ("meta_test", "last")]
+    assert [(r["task"], r["name"]) for r in tests] == [("2", "zeta 4"), ("3", "zeta 4.5"),
+                                                       ("4", "zeta 5")]
+
+
+def test_an_unknown_own_best_round_is_told(tmp_path):
+    folder = write_run(tmp_path, fresh=100, own_best=True)
+    edit(folder, "final.csv", lambda t: t[:t.rindex("own_best")])
+    out, err = plot(tmp_path, "--format", "png")
+    assert "own_best returns of 1 of 2 tasks: they are left out" in err
+    assert "own best" not in out
+
+
+def test_older_files_are_read(tmp_path):
+    write_run(tmp_path / "new", fresh=100)
+    old = write_run(tmp_path / "old", fresh=100)
+    make_older(old)
+    with open(os.path.join(old, "rounds.csv")) as file:
+        assert "context" not in file.readline()
+    for top in ("new", "old"):
+        plot(tmp_path / top, "--format", "png", "--out", tmp_path / top / "out")
+    for name in os.listdir(str(tmp_path / "new/out")):
+        assert (tmp_path / "new/out" / name).read_bytes() == (
+            tmp_path / "old/out" / name).read_bytes(), name
+
+
+def test_test_tasks_must_follow_the_training_tasks(tmp_path):
+    path = edit(write_run(tmp_path, tests=1), "rounds.csv",
+                lambda t: t.replace(",2,test", ",1,test"))
+    assert fails(tmp_path) == ("plot: %s: the test task 1 does not follow the 2 training tasks."
+                               % path)
+
+
+def test_the_optimum_is_that_of_the_training_tasks(tmp_path):
+    folder = write_run(tmp_path, tests=1, optimal=(-4.0, -8.0, -30.0))
+    assert groups_of(tmp_path)["grid"][0].optimal() == -6
+    edit(folder, "manifest.json", lambda t: t.replace(', "optimal_return": -30.0', ""))
+    assert groups_of(tmp_path)["grid"][0].optimal() == -6
+
+
+def test_pooled_is_a_baseline(tmp_path):
+    folders = {name: [write_run(tmp_path, name, s, fresh=100, learner="dqn") for s in range(2)]
+               for name in ("pmeta", "independent", "pooled")}
+    # what pooled does not use tells no two of its groups apart
+    edit(folders["pooled"][1], "config.yaml", lambda t: t.replace("eta: 0.08", "eta: 0.5")
+         .replace("beta: 0", "beta: 1"))
+    groups = groups_of(tmp_path)["grid"]
+    assert [group.label for group in groups] == ["pMeta-RL λ=10", "independent", "pooled"]
+    kept = Kept()
+    pf.learning_curves("grid", groups, kept, "")
+    lines = lines_of(kept.written[0][0].axes[0])
+    assert lines["PP, pooled"][1] == pytest.approx(over_seeds(folders["pooled"], "personal"))
+    out, _ = plot(tmp_path, "--format", "png", "--out", tmp_path / "out")
+    values = [fresh_mean(f, "best", "personal", own=False) for f in folders["pooled"]]
+    row = summary(tmp_path / "out")["pooled"]
+    assert float(row["all_fresh_best_mean"]) == pytest.approx(statistics.mean(values))
+    cells = re.split(" {2,}", table_row(out, "pooled DQN on all tasks  ").strip())
+    assert cells[2] == "%.2f ± %.2f" % (statistics.mean(values), statistics.stdev(values))
+
+
+@pytest.mark.parametrize("lengths", [{"rounds": 8}, {"updates": 3}])
+def test_rounds_of_different_lengths_are_drawn_over_environment_steps(tmp_path, lengths):
+    ours = [write_run(tmp_path, seed=s) for s in range(2)]
+    theirs = [write_run(tmp_path, "model_averaging", s, **lengths) for s in range(2)]
+    kept = Kept()
+    pf.learning_curves("grid", groups_of(tmp_path)["grid"], kept, "")
+    axis = kept.written[0][0].axes[0]
+    assert axis.get_xlabel() == "environment steps a task"
+    lines = list(lines_of(axis).values())
+    assert len(lines) == 3
+    for (x, y), folders in ((lines[0], ours), (lines[2], theirs)):
+        assert x == pytest.approx(over_seeds(folders, "personal", column="env_steps"))
+        assert y == pytest.approx(over_seeds(folders, "meta"))
+    assert axis.get_xlim()[1] >= lines[2][0][-1]
+    label = list(lines_of(axis))[2]
+    assert label == "MP, model averaging " + ("C=8" if "rounds" in lengths else "R=3")
+    # over rounds their means differ in meaning: nothing is paired
+    plot(tmp_path, "--format", "png")
+    assert list(summary(tmp_path / "figures").values())[0]["pairs"] == ""
+
+
+def test_curves_of_a_length_setting_are_over_environment_steps(tmp_path):
+    for updates in (1, 5):
+        write_run(tmp_path, updates=updates, run_id="r%d" % updates)
+    kept = Kept()
+    pf.draw_runs(groups_of(tmp_path), ("curves",), {"curves": kept, "sweep": kept})
+    figure = dict((name, figure) for figure, name in kept.written)["updates_per_round_curves"]
+    assert [axis.get_xlabel() for axis in figure.axes] == ["environment steps a task"] * 2
+    assert lines_of(figure.axes[1])["R=5"][0] == [550, 1100, 1650, 2200]
+
+
+def test_presets_are_told_apart_by_their_settings(tmp_path):
+    for seed, preset in enumerate(("quick", "paper")):
+        edit(write_run(tmp_path, seed=seed), "config.yaml",
+             lambda t: "preset: %s\n%s" % (preset, t))
+    assert [len(group.runs) for group in groups_of(tmp_path)["grid"]] == [2]
 
 
 @pytest.fixture
@@ -535,13 +761,9 @@ def test_convergence_figures(tmp_path, convergence):
 
 
 def test_convergence_slopes_are_measured(tmp_path, convergence):
-    class Kept(pd.Figures):
-        def save(self, figure, name):
-            self.written.append(figure)
-
-    kept = Kept("", ())
+    kept = Kept()
     pc.draw_convergence(pr.load_convergence([str(convergence)]), kept)
-    contraction, _, gradient, distance = kept.written
+    contraction, _, gradient, distance = [figure for figure, _ in kept.written]
     line = contraction.axes[0].lines[0]
     assert list(line.get_ydata() * line.get_xdata()) == pytest.approx([0.9] * 50)
     labels = [text.get_text() for text in gradient.axes[0].get_legend().get_texts()]

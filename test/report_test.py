@@ -130,7 +130,7 @@ def test_tables_show_the_numbers_of_the_csv_files(folders, written):
     values = []
     for folder in folders["pmeta"]:
         with open(os.path.join(folder, "final.csv")) as file:
-            values += [float(line.split(",")[5]) for line in file
+            values += [float(line.split(",")[6]) for line in file
                        if line.startswith("last,3,meta,-1,1,")]
     assert len(values) == 3 and last[5] == spread(values)
     assert len(runs) == 1 + 9
@@ -193,6 +193,31 @@ def test_one_run_gives_a_report_beside_its_files(tmp_path):
     # the same runs give the same bytes
     report(folder)
     assert Page(path).text == first
+
+
+@needs_chromium
+def test_test_tasks_have_columns_and_a_figure(tmp_path):
+    folders = [write_run(tmp_path, seed=s, contexts=(0, 2), tests=1, learner="sac", fresh=100,
+                         own_best=True) for s in range(2)]
+    path = tmp_path / "r.html"
+    report(tmp_path, "-o", path)
+    found = look(path)
+    best, learning, tasks, _ = found["tables"]
+    assert best[0][2:] == ["best", "last", "fresh (best)", "fresh (own best)", "fresh (last)"]
+    assert best[1][5] == spread([fresh_mean(f, "own_best", "personal") for f in folders])
+    last = spread([curve(f, "meta", "test", 2)[-1] for f in folders])
+    assert best[3][1:4] == ["MP on test tasks", "-", last]
+    assert best[3][4] == spread([fresh_mean(f, "best", "meta", split="test") for f in folders])
+    assert learning[0][4] == "MP test last" and learning[1][4] == last
+    assert learning[1][3] == spread([curve(f, "meta", "train", 2)[-1] for f in folders])
+    assert tasks[0][4:] == ["task 0", "task 1", "test task 2"]
+    by_policy = {(row[1], row[2]): row[4:] for row in tasks[1:]}
+    assert by_policy["PP", "last"][2] == "-"
+    assert by_policy["MP", "last"][2] == spread([fresh_mean(f, "last", "meta", split="test")
+                                                 for f in folders])
+    text = Page(path).text
+    assert "test task 2: zeta 4" in text and "which nobody trained on, before and after" in text
+    assert len(found["images"]) == 3 and found["overflow"] <= 0
 
 
 def test_what_is_left_out_is_named_on_the_page(tmp_path):

@@ -8,6 +8,7 @@ import os
 import numpy as np
 
 from pmeta_files import PlotError, warn
+from pmeta_returns import adaptations, key_of, with_stand_ins, words_of
 
 TOPIC = "/returns"
 TYPE = "pmeta_msgs/TaskReturn"
@@ -22,7 +23,7 @@ class BagRun:
         self.path = path
         self.run_id = run_id
         self.returns = returns
-        self.curves = {}
+        curves = {}
         self.rounds = np.array(sorted(set.intersection(*map(set, returns.values()))), dtype=int)
         if not len(self.rounds):
             raise PlotError("%s has no round with returns of every policy." % path)
@@ -30,16 +31,17 @@ class BagRun:
         if lacking:
             warn("%s lacks %d of the first %d rounds (first: round %d): they were not recorded."
                  % (path, len(lacking), self.rounds[-1], lacking[0]))
-        for policy, by_round in returns.items():
+        for key, by_round in returns.items():
             tasks = max(len(by_task) for by_task in by_round.values())
             short = [r for r in self.rounds if len(by_round[r]) < tasks]
             if short:
                 warn("%s: %s returns of some tasks are missing in %d rounds (first: round %d); "
                      "their means are over the tasks that were recorded."
-                     % (path, policy, len(short), min(short)))
+                     % (path, words_of(key), len(short), min(short)))
             # summed in the order of the tasks, as in rounds.csv: the same bits
-            self.curves[policy] = np.array([
+            curves[key] = np.array([
                 np.mean([by_round[r][task] for task in sorted(by_round[r])]) for r in self.rounds])
+        self.curves = with_stand_ins(curves)
 
 
 def read_bag(path):
@@ -68,12 +70,15 @@ def _runs_of(path, bag):
                         % (path, TYPE, ", ".join(sorted(topics)) or "none"))
     runs = {}
     for _, message, _ in bag.read_messages(topics=chosen):
-        if message.split_name != "train":
-            continue
-        by_task = runs.setdefault(message.run_id, {}).setdefault(
-            message.policy_name, {}).setdefault(message.round, {})
+        # bags of older runs lack the field
+        key = key_of(message.policy_name, message.split_name,
+                     getattr(message, "context_episodes", 0))
+        by_task = runs.setdefault(message.run_id, {}).setdefault(key, {}).setdefault(
+            message.round, {})
         # an agent that was started again may say it twice: the first counts, as in rounds.csv
         by_task.setdefault(message.task, message.return_mean)
+    runs = {run_id: returns for run_id, returns in runs.items()
+            if "personal" in returns or adaptations(returns, "train")}
     if not runs:
         raise PlotError("%s holds no returns of training tasks." % path)
     return [BagRun(path, run_id, runs[run_id]) for run_id in sorted(runs)]

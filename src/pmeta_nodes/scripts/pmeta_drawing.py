@@ -1,6 +1,7 @@
 """What every figure of pMeta shares: colours, style, panels, legends, and the files written."""
 
 import os
+import textwrap
 
 import matplotlib
 
@@ -79,6 +80,11 @@ def legend_right(axes):
 
 def headline(figure, text):
     figure.suptitle(text.replace("$", "\\$"), x=0.01, ha="left", fontsize=11)
+
+
+def wrapped_name(name, width=30):
+    """A task's name in short lines, which end between two of its properties, not within one."""
+    return textwrap.fill(", ".join(part.replace(" ", "\u00a0") for part in name.split(", ")), width)
 
 
 def spread_ticks(axis, values):

@@ -4,23 +4,22 @@ import textwrap
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 
 import pmeta_runs as pr
 import pmeta_tables as pt
-from pmeta_drawing import (BLACK, BLUE, GREEN, GREY, PALETTE, PURPLE, RED, folder_for, headline,
-                           legend_right, panels, spread_ticks)
+from pmeta_curves import (MP, PP, RETURN, adaptation_curves, draw_curve, draw_optimum, over_seeds,
+                          progress_axis, seeds_text)
+from pmeta_drawing import (BLUE, GREEN, GREY, PALETTE, PURPLE, RED, SKY, folder_for, headline,
+                           legend_right, panels, spread_ticks, wrapped_name)
 from pmeta_files import SNAPSHOTS
 
-PP = {"color": RED, "linestyle": "-", "marker": "o"}
-MP = {"color": BLUE, "linestyle": "-", "marker": "s"}
 BASELINES = {  # algorithm: (the policy it is judged by, label, style)
     "model_averaging": ("meta", "MP, model averaging",
                         {"color": GREEN, "linestyle": "--", "marker": "^"}),
     "independent": ("personal", "PP, independent",
                     {"color": PURPLE, "linestyle": "-.", "marker": "D"}),
+    "pooled": ("personal", "PP, pooled", {"color": SKY, "linestyle": (0, (5, 1)), "marker": "v"}),
 }
-RETURN = "return\n(reward per episode, mean over tasks)"
 MAX_PANELS = 3
 MAX_SLICES = 4
 MAX_TASK_GROUPS = 6
@@ -31,88 +30,64 @@ TASK_STYLES = {  # label, colour, marker
 }
 
 
-def seeds_text(groups):
-    counts = [len(group.runs) for group in groups]
-    if max(counts) == 1:
-        return "1 seed"
-    fewest = "" if min(counts) == max(counts) else "%d to " % min(counts)
-    return "%s%d seeds" % (fewest, max(counts))
-
-
-def over_seeds(what, groups):
-    """"mean ± what over 5 seeds", or of one seed the value itself."""
-    seeds = seeds_text(groups)
-    return seeds if seeds == "1 seed" else "%s over %s" % (what, seeds)
-
-
-def round_axis(axis, rounds):
-    axis.set_xlabel("round")
-    axis.set_xlim(rounds[0] - 0.3, rounds[-1] + 0.3)
-    if len(rounds) <= 10:
-        axis.set_xticks(rounds)
-    else:
-        axis.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
-
-
-def draw_curve(axis, group, policy, label, band=True, **style):
-    """Mean over seeds, and the sample standard deviation as a band."""
-    curves = group.curves(policy)
-    mean = curves.mean(axis=0)
-    style.setdefault("markevery", max(1, len(mean) // 15))
-    axis.plot(group.rounds, mean, label=label, **style)
-    if band and len(curves) > 1:
-        std = curves.std(axis=0, ddof=1)
-        axis.fill_between(group.rounds, mean - std, mean + std, color=style["color"], alpha=0.16,
-                          linewidth=0)
-
-
-def draw_optimum(axis, groups):
-    values = [group.optimal() for group in groups]
-    if None not in values and np.allclose(values, values[0], rtol=1e-9, atol=0):
-        axis.axhline(values[0], color=BLACK, linestyle=(0, (4, 3)), linewidth=1,
-                     label="optimum")
-
-
 def learning_curves(experiment, groups, figures, prefix):
     """pMeta-RL against its baselines, a panel for every setting that they share."""
-    pmeta = pmeta_only(groups)
+    pmeta = pr.pmeta_only(groups)
     contexts = {}
     for group in pmeta:
         contexts.setdefault(group.context(), []).append(group)
     shown = [pr.reference(members) for members in contexts.values()]
     if len(shown) > MAX_PANELS:
         shown = [pr.reference(pmeta)]
-    # tasks that differ between panels have scales of their own
-    sharey = not any(key.startswith("environment.") for key in pr.varying(shown))
+    # training tasks that differ between panels have scales of their own
+    sharey = not any(key.startswith("environment.") and not key.startswith("environment.test_")
+                     for key in pr.varying(shown))
 
+    baselines = [baseline_curves(group, groups) for group in shown]
+    drawn = shown + [baseline for found in baselines for baseline, _, _, _ in found]
+    drawn = drawn or groups[:len(PALETTE)]
+    steps = pr.differ_in_length(drawn)
     figure, axes = panels(1, max(1, len(shown)), sharey)
-    drawn = []
-    for axis, group in zip(axes[0], shown):
+    for axis, group, found in zip(axes[0], shown, baselines):
         name = " ".join([pr.ALGORITHMS["pmeta"]] + pr.setting_texts(group, []))
-        panel = [group]
         for policy, label, style in (("meta", "MP, ", MP), ("personal", "PP, ", PP)):
             if policy in group.policies:
-                draw_curve(axis, group, policy, label + name, zorder=3, **style)
-        for algorithm, (policy, label, style) in BASELINES.items():
-            baseline = pr.baseline_of(group, groups, algorithm)
-            if baseline is not None and policy in baseline.policies:
-                draw_curve(axis, baseline, policy, label, **style)
-                panel.append(baseline)
-        draw_optimum(axis, panel)
+                draw_curve(axis, group, policy, label + name, steps=steps, zorder=3, **style)
+        draw_adaptation(axis, group, steps)
+        for baseline, policy, label, style in found:
+            draw_curve(axis, baseline, policy, label, steps=steps, **style)
+        draw_optimum(axis, [group] + [baseline for baseline, _, _, _ in found])
         axis.set_title(_wrapped(pr.fixed_texts(group, pmeta, "personal.lambda")), loc="left")
-        round_axis(axis, group.rounds)
-        drawn += panel
+        progress_axis(axis, drawn if steps else [group], steps)
     if not shown:
-        drawn = groups[:len(PALETTE)]
         for group, color in zip(drawn, PALETTE):
-            for policy in group.policies[-1:]:
-                draw_curve(axes[0][0], group, policy, group.label, color=color, marker="o")
+            policy = "meta" if "meta" in group.policies else "personal"
+            draw_curve(axes[0][0], group, policy, group.label, steps=steps, color=color, marker="o")
         draw_optimum(axes[0][0], drawn)
-        round_axis(axes[0][0], max((group.rounds for group in drawn), key=len))
+        progress_axis(axes[0][0], drawn, steps)
     axes[0][0].set_ylabel(RETURN)
     legend_right(axes[0])
     headline(figure, "%s: %s" % (experiment, over_seeds("mean ± standard deviation", drawn)))
     figures.save(figure, prefix + "learning_curves")
+
+
+def baseline_curves(group, groups):
+    """[(baseline, policy, label, style)]; one that goes on for longer is one, too."""
+    found = []
+    for algorithm, (policy, label, style) in BASELINES.items():
+        baseline = (pr.baseline_of(group, groups, algorithm)
+                    or pr.baseline_of(group, groups, algorithm, free=pr.LENGTHS))
+        if baseline is not None and policy in baseline.policies:
+            lengths = [pr.setting_text(key, baseline.settings.get(key)) for key in pr.LENGTHS
+                       if baseline.settings.get(key) != group.settings.get(key)]
+            found.append((baseline, policy, " ".join([label] + lengths), style))
+    return found
+
+
+def draw_adaptation(axis, group, steps=False):
+    """The meta-policy before adaptation, and on test tasks."""
+    for key, label, style in adaptation_curves(group):
+        draw_curve(axis, group, key, label, band=False, steps=steps, **style)
 
 
 def bag_curves(run, name, figures):
@@ -122,7 +97,8 @@ def bag_curves(run, name, figures):
     for policy, label, style in (("meta", "MP", MP), ("personal", "PP", PP)):
         if policy in group.policies:
             draw_curve(axes[0][0], group, policy, label, **style)
-    round_axis(axes[0][0], run.rounds)
+    draw_adaptation(axes[0][0], group)
+    progress_axis(axes[0][0], [group])
     axes[0][0].set_ylabel(RETURN)
     legend_right(axes[0])
     headline(figure, "run %s, from its bag" % run.run_id)
@@ -133,6 +109,10 @@ def setting_curves(experiment, key, members, groups, figures, name):
     """Curves of PP and MP for every value of one setting."""
     figure, axes = panels(1, 2)
     numeric = all(pr.is_number(group.settings.get(key)) for group in members)
+    baseline = averaging_of(members[0], groups)
+    if any(averaging_of(group, groups) is not baseline for group in members):
+        baseline = None
+    steps = pr.differ_in_length(members)
     for axis, policy, title in zip(axes[0], ("personal", "meta"),
                                    ("PP, personal policies", "MP, meta-policy")):
         for i, group in enumerate(members):
@@ -142,24 +122,19 @@ def setting_curves(experiment, key, members, groups, figures, name):
             color = (plt.get_cmap("viridis")(0.87 * i / (len(members) - 1)) if numeric
                      else PALETTE[i % len(PALETTE)])
             draw_curve(axis, group, policy, pr.setting_text(key, group.settings.get(key)),
-                       band=False, color=color, marker="osD^vP*X"[i % 8])
-        baseline = averaging_of(members[0], groups)
-        if baseline is not None and all(averaging_of(g, groups) is baseline for g in members):
-            draw_curve(axis, baseline, "meta", "MP, model averaging", band=False, color=GREY,
-                       linestyle="--", linewidth=1.4)
+                       band=False, steps=steps, color=color, marker="osD^vP*X"[i % 8])
+        if baseline is not None:
+            draw_curve(axis, baseline, "meta", "MP, model averaging", band=False, steps=steps,
+                       color=GREY, linestyle="--", linewidth=1.4)
         draw_optimum(axis, members)
         axis.set_title(title, loc="left")
-        round_axis(axis, max((group.rounds for group in members), key=len))
+        progress_axis(axis, members, steps)
     axes[0][0].set_ylabel(RETURN)
     legend_right(axes[0])
-    fixed = pr.fixed_texts(members[0], pmeta_only(groups), key)
+    fixed = pr.fixed_texts(members[0], pr.pmeta_only(groups), key)
     headline(figure, "%s: %s, %s" % (experiment, " ".join(["pMeta-RL"] + fixed),
                                      over_seeds("mean", members)))
     figures.save(figure, name)
-
-
-def pmeta_only(groups):
-    return [group for group in groups if group.algorithm == "pmeta"]
 
 
 def averaging_of(group, groups):
@@ -184,7 +159,7 @@ def sweep_figure(experiment, key, found, groups, figures, name):
         for axis, measure, title in zip(row, ("last", "auc"),
                                         ("at the last round", "mean over all rounds")):
             draw_sweep(axis, key, members, measure, groups)
-            fixed = pr.fixed_texts(members[0], pmeta_only(groups), key)
+            fixed = pr.fixed_texts(members[0], pr.pmeta_only(groups), key)
             axis.set_title("\n".join([title] + ([_wrapped(fixed)] if fixed else [])), loc="left")
             axis.set_xlabel("%s (%s)" % (pr.symbol(key), key) if pr.symbol(key) != key else key)
         row[0].set_ylabel(RETURN)
@@ -228,12 +203,8 @@ def task_figure(experiment, groups, figures, prefix):
     """PP and MP of each task, every seed a dot: a task that is stuck shows, which a mean hides."""
     figures.write(pt.csv_text(pt.TASK_COLUMNS, pt.task_rows(experiment, groups)),
                   prefix + "tasks_last.csv")
-    shown = groups
-    if len(groups) > MAX_TASK_GROUPS:
-        first = pr.reference(pmeta_only(groups) or groups)
-        first = [first] + [pr.baseline_of(first, groups, name) for name in BASELINES]
-        chosen = ([g for g in groups if g in first] + [g for g in groups if g not in first])
-        shown = [g for g in groups if g in chosen[:MAX_TASK_GROUPS]]
+    shown = pr.chief(groups, MAX_TASK_GROUPS)
+    if len(shown) < len(groups):
         pr.warn("tasks_last shows %d of the %d groups of %s; tasks_last.csv has all of them."
                 % (len(shown), len(groups), experiment))
     tasks = max(group.runs[0].num_tasks for group in shown)
@@ -248,9 +219,7 @@ def task_figure(experiment, groups, figures, prefix):
                            loc="left", fontsize=9.5)
     names = max((group.runs[0].task_names for group in shown), key=len)
     axes[0][0].set_yticks(range(tasks))
-    # a line ends between two properties of a task, not within one
-    axes[0][0].set_yticklabels([textwrap.fill(", ".join(
-        part.replace(" ", "\u00a0") for part in name.split(", ")), 30) for name in names])
+    axes[0][0].set_yticklabels([wrapped_name(name) for name in names])
     axes[0][0].set_ylim(tasks - 0.5, -0.5)
     for axis in axes[-1]:
         axis.set_xlabel("return of the task (reward per episode)")
@@ -291,7 +260,7 @@ def draw_runs(experiments, kinds, figures):
             learning_curves(experiment, groups, curves, prefix)
         if "tasks" in kinds and any(g.deep or any(r.fresh for r in g.runs) for g in groups):
             task_figure(experiment, groups, figures["tasks"], prefix)
-        pmeta = pmeta_only(groups)
+        pmeta = pr.pmeta_only(groups)
         keys = pr.varying(pmeta)
         names = [pr.short_name(key) for key in keys]
         for key in keys:

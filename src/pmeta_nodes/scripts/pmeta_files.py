@@ -7,9 +7,17 @@ import sys
 import numpy as np
 import yaml
 
-HEADER = "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s"
-FRESH_HEADER = "snapshot,round,policy,trained_task,task,return_mean,return_std,episodes"
+from pmeta_returns import key_of
+
+# those of older runs lack a column
+HEADERS = ("round,task,split,policy,context_episodes,return_mean,return_std,episodes,env_steps,"
+           "updates,wall_s",
+           "round,task,split,policy,return_mean,return_std,episodes,env_steps,updates,wall_s")
+FRESH_HEADERS = (
+    "snapshot,round,policy,trained_task,task,split,return_mean,return_std,episodes",
+    "snapshot,round,policy,trained_task,task,return_mean,return_std,episodes")
 SNAPSHOTS = ("best", "last")
+OWN_BEST = "own_best"
 WORD_COLUMNS = ("diversity", "step", "update")
 
 
@@ -36,10 +44,9 @@ def warnings_to(receiver):
 
 def read_columns(path):
     """{column: values} of a convergence file: words, or floats where NaN is fair."""
-    header = tuple(read_text(path).split("\n", 1)[0].split(","))
-    columns = {name: [] for name in header}
-    for number, fields in read_csv(path):
-        for name, text in zip(header, fields):
+    columns = {name: [] for name in read_text(path).split("\n", 1)[0].split(",")}
+    for number, row in read_csv(path):
+        for name, text in row.items():
             if name not in WORD_COLUMNS:
                 try:
                     text = float(text)
@@ -57,70 +64,87 @@ def require_columns(path, columns, names):
 
 
 def read_rounds(path):
-    """{policy: {round: {task: return_mean}}} of the training split of a rounds.csv."""
-    returns = {}
-    skipped = 0
-    for number, fields in read_csv(path, HEADER):
+    """(returns, steps) of a rounds.csv.
+
+    returns: {key of pmeta_returns: {round: {task: return_mean}}}; steps: {round: {training task:
+    environment steps up to then}}.
+    """
+    returns, steps = {}, {}
+    for number, row in read_csv(path, HEADERS):
         where = "%s line %d" % (path, number)
-        row = dict(zip(HEADER.split(","), fields))
-        round_, task = to_int(where, "round", row["round"]), to_int(where, "task", row["task"])
+        round_, task, context = (to_int(where, key, row.get(key, "0"))
+                                 for key in ("round", "task", "context_episodes"))
         for key in ("return_mean", "return_std", "episodes", "env_steps", "updates", "wall_s"):
             row[key] = to_number(where, key, row[key])
-        if row["policy"] not in ("personal", "meta") or row["split"] not in ("train", "test"):
+        policy, split = row["policy"], row["split"]
+        if policy not in ("personal", "meta") or split not in ("train", "test"):
             raise PlotError("%s: split and policy are '%s' and '%s' but must be train or test, and "
-                            "personal or meta." % (where, row["split"], row["policy"]))
-        if round_ < 1 or task < 0:
-            raise PlotError("%s: round %d, task %d is out of range." % (where, round_, task))
-        if row["split"] == "test":
-            skipped += 1
-            continue
-        by_task = returns.setdefault(row["policy"], {}).setdefault(round_, {})
+                            "personal or meta." % (where, split, policy))
+        if round_ < 1 or task < 0 or context < 0:
+            raise PlotError("%s: round %d, task %d, context_episodes %d is out of range."
+                            % (where, round_, task, context))
+        if policy == "personal" and (split, context) != ("train", 0):
+            raise PlotError("%s: a personal policy neither adapts nor has test tasks." % where)
+        by_task = returns.setdefault(key_of(policy, split, context), {}).setdefault(round_, {})
         if task in by_task:
-            raise PlotError("%s repeats round %d, task %d, %s." % (where, round_, task,
-                                                                  row["policy"]))
+            raise PlotError("%s repeats round %d, task %d, %s." % (where, round_, task, policy))
         by_task[task] = row["return_mean"]
-    if skipped:
-        warn("%s: %d rows of test tasks are not drawn." % (path, skipped))
-    return returns
+        if split == "train":
+            steps.setdefault(round_, {})[task] = row["env_steps"]
+    return returns, steps
 
 
-def read_fresh(path, tasks):
-    """{(snapshot, policies): return of each task} of a final.csv.
+def read_fresh(path, tasks, tests):
+    """{(snapshot, policies): return of each task} of a final.csv with so many tasks and test tasks.
 
-    `policies` is personal (each on its own task), meta, or all: the mean over the personal
-    policies of all tasks.
+    `policies` is personal (each on its own task), meta, meta_test (on the test tasks), or all: the
+    mean over the personal policies of all tasks.
     """
     found = {}
-    for number, fields in read_csv(path, FRESH_HEADER):
+    for number, row in read_csv(path, FRESH_HEADERS):
         where = "%s line %d" % (path, number)
-        row = dict(zip(FRESH_HEADER.split(","), fields))
-        trained, task = to_int(where, "trained_task", row["trained_task"]), to_int(where, "task",
-                                                                                   row["task"])
+        trained, task = (to_int(where, key, row[key]) for key in ("trained_task", "task"))
         value = to_number(where, "return_mean", row["return_mean"])
-        if row["snapshot"] not in SNAPSHOTS or row["policy"] not in ("personal", "meta"):
-            raise PlotError("%s: snapshot and policy are '%s' and '%s' but must be last or best, "
-                            "and personal or meta." % (where, row["snapshot"], row["policy"]))
-        if not 0 <= task < tasks or not (0 <= trained < tasks or row["policy"] == "meta"):
-            raise PlotError("%s: task %d or trained_task %d is out of range." % (where, task,
-                                                                                trained))
-        names = [row["policy"]] if row["policy"] == "meta" else (
-            ["all"] + ["personal"] * (trained == task))
-        for name in names:
-            by_pair = found.setdefault((row["snapshot"], name), {})
+        snapshot, policy, split = row["snapshot"], row["policy"], row.get("split", "train")
+        if snapshot not in SNAPSHOTS + (OWN_BEST,) or policy not in ("personal", "meta"):
+            raise PlotError("%s: snapshot and policy are '%s' and '%s' but must be last, best or "
+                            "own_best, and personal or meta." % (where, snapshot, policy))
+        if split not in ("train", "test"):
+            raise PlotError("%s: split is '%s' but must be train or test." % (where, split))
+        known = range(tasks) if split == "train" else range(tasks, tasks + tests)
+        if task not in known or not (0 <= trained < tasks or policy == "meta"):
+            raise PlotError("%s: task %d (%s) or trained_task %d is out of range."
+                            % (where, task, split, trained))
+        if snapshot == OWN_BEST and (policy, trained) != ("personal", task):
+            raise PlotError("%s: own_best is of a personal policy on its own task." % where)
+        for name in _fresh_names(snapshot, policy, split, trained == task):
+            by_pair = found.setdefault((snapshot, name), {})
             if (trained, task) in by_pair:
                 raise PlotError("%s repeats an earlier line." % where)
             by_pair[trained, task] = value
     fresh = {}
     for (snapshot, name), by_pair in found.items():
-        complete = tasks * tasks if name == "all" else tasks
+        known = range(tasks, tasks + tests) if name == "meta_test" else range(tasks)
+        complete = tasks * tasks if name == "all" else len(known)
         if len(by_pair) == complete and (name != "all" or tasks > 1):
             fresh[snapshot, name] = np.array([
                 np.mean([by_pair[pair] for pair in sorted(by_pair) if pair[1] == task])
-                for task in range(tasks)])
+                for task in known])
+        elif snapshot == OWN_BEST:
+            # a task that never reported has no best round
+            warn("%s has the own_best returns of %d of %d tasks: they are left out."
+                 % (path, len(by_pair), complete))
         elif name != "all":
             raise PlotError("%s has the %s returns (%s) of %d of %d tasks."
-                            % (path, name, snapshot, len(by_pair), tasks))
+                            % (path, name, snapshot, len(by_pair), complete))
     return fresh
+
+
+def _fresh_names(snapshot, policy, split, own):
+    """What one line of final.csv counts among."""
+    if policy == "meta":
+        return ["meta" if split == "train" else "meta_test"]
+    return ["all"] * (snapshot != OWN_BEST) + ["personal"] * own
 
 
 def read_text(path):
@@ -131,24 +155,24 @@ def read_text(path):
         raise PlotError("%s is not a text file." % path)
 
 
-def read_csv(path, header=None):
-    """(line number, fields) of every row below the header; without `header` any will do."""
+def read_csv(path, headers=()):
+    """(line number, {column: text}) of every row; without `headers` any header will do."""
     text = read_text(path)
     if not text:
         raise PlotError("%s line 1: the file is empty." % path)
     lines = text.split("\n")
-    if header is not None and lines[0] != header:
-        raise PlotError("%s line 1: the header must be '%s'." % (path, header))
+    if headers and lines[0] not in headers:
+        raise PlotError("%s line 1: the header must be '%s'." % (path, headers[0]))
     if lines[-1] != "":
         raise PlotError("%s line %d is truncated: it does not end." % (path, len(lines)))
-    columns = lines[0].count(",") + 1
+    columns = lines[0].split(",")
     rows = []
     for number, line in enumerate(lines[1:-1], start=2):
         fields = line.split(",")
-        if len(fields) != columns:
+        if len(fields) != len(columns):
             raise PlotError("%s line %d has %d fields instead of %d."
-                            % (path, number, len(fields), columns))
-        rows.append((number, fields))
+                            % (path, number, len(fields), len(columns)))
+        rows.append((number, dict(zip(columns, fields))))
     return rows
 
 

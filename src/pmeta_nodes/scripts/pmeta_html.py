@@ -71,6 +71,8 @@ CAPTIONS = (
     ("_curves", "Learning curves for every value of %s."),
     ("sweep_", "Return against %s."),
     ("tasks_last", "Returns task by task; a task that is stuck shows, which a mean hides."),
+    ("_unseen_tasks", "The meta-policy on training tasks and on test tasks, which nobody trained "
+     "on, before and after adaptation from exploration episodes, as far as there are any."),
     ("value_maps", "What each policy takes a state to be worth (colour), and greedy episodes from "
      "three starts at rest (lines; the titles count their steps). Optimal: value iteration."),
     ("convergence_", "Measured beside the theory: %s."),

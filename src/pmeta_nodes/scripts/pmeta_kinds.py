@@ -3,15 +3,18 @@
 import pmeta_convergence as pc
 import pmeta_drawing as pd
 import pmeta_figures as pf
+import pmeta_unseen as pu
 import pmeta_value_maps as pv
 
-KINDS = ("curves", "sweep", "tasks", "values", "convergence")
+KINDS = ("curves", "sweep", "tasks", "unseen", "values", "convergence")
 
 
 def draw(experiments, convergence, kinds, figures):
     """Draws what the data allow; `figures` holds a pd.Figures for each kind."""
     with pd.style():
         pf.draw_runs(experiments, kinds, figures)
+        if "unseen" in kinds:
+            pu.draw_unseen(experiments, figures["unseen"])
         if "values" in kinds:
             pv.draw_value_maps(experiments, figures["values"])
         if "convergence" in kinds:

@@ -2,7 +2,8 @@
 
 A run folder holds config.yaml, manifest.json and rounds.csv, and final.csv if the kept policies
 were tried on fresh episodes. A group is all runs of one experiment whose settings are equal but for
-the seed; a group's curves are seeds x rounds, each entry the mean return over the training tasks.
+the seed; a group's curves are seeds x rounds, each entry the mean return over the training tasks,
+or over the test tasks. pmeta_returns says what curves there are.
 """
 
 import json
@@ -12,25 +13,31 @@ import re
 
 import numpy as np
 
-from pmeta_files import (PlotError, read_columns, read_fresh, read_rounds, read_text, read_yaml,
-                         warn)
+from pmeta_files import (OWN_BEST, PlotError, read_columns, read_fresh, read_rounds, read_text,
+                         read_yaml, warn)
+from pmeta_returns import POLICIES, adaptations, split_of, with_stand_ins, words_of
 
 CONVERGENCE_MARKS = ("statements.csv", "gradient.csv", "contraction.csv")
 CONVERGENCE_FILES = ("contraction.csv", "fixed_point.csv", "gradient.csv", "distance.csv")
 
 # settings that name a run or pace it, and do not shape its result
-NAMES = {"experiment", "algorithm", "seed", "run_id", "results_dir", "pace", "publish_trajectories",
-         "fresh_episodes"}
+NAMES = {"experiment", "preset", "algorithm", "seed", "run_id", "results_dir", "pace",
+         "publish_trajectories", "fresh_episodes"}
+# how far a run goes: where they differ, rounds compare nothing, but environment steps do
+LENGTHS = ("rounds", "updates_per_round")
 # settings an algorithm fixes or does not use: they tell no two groups of it apart
-PROXIMAL = {"personal.lambda", "personal.eta", "personal.personal_init", "personal.proximal"}
+PROXIMAL = {"personal.lambda", "personal.lambda_actor", "personal.lambda_critic",
+            "personal.lambda_encoder", "personal.eta", "personal.personal_init",
+            "personal.proximal"}
+AGGREGATION = {"aggregation.beta", "aggregation.quorum", "aggregation.round_timeout"}
 UNUSED = {
     "model_averaging": PROXIMAL,
-    "independent": PROXIMAL | {"aggregation.beta", "aggregation.quorum",
-                               "aggregation.round_timeout"},
+    "independent": PROXIMAL | AGGREGATION,
+    "pooled": PROXIMAL | AGGREGATION,
 }
 DEFAULTS = {"personal.lambda": 10, "personal.personal_init": "meta"}
 ALGORITHMS = {"pmeta": "pMeta-RL", "model_averaging": "model averaging",
-              "independent": "independent"}
+              "independent": "independent", "pooled": "pooled"}
 SYMBOLS = {"personal.lambda": "λ", "personal.alpha": "α", "personal.eta": "η",
            "aggregation.beta": "β", "q_learning.gamma": "γ", "q_learning.updates": "K",
            "updates_per_round": "R", "rounds": "C"}
@@ -73,7 +80,7 @@ def load(dirs):
 
 
 class Run:
-    """A finished run: its settings, and per round the mean return over the training tasks."""
+    """A finished run: its settings, and per round the mean returns over its tasks."""
 
     def __init__(self, folder, manifest):
         self.folder = folder
@@ -90,29 +97,47 @@ class Run:
         self.started = str(manifest.get("started") or "")
         self.commit = str(manifest.get("commit") or "unknown")
         self.optimal = _optimal_return(manifest)
-        path = os.path.join(folder, "rounds.csv")
-        returns = read_rounds(path)
         self.rounds = np.arange(1, self.num_rounds + 1)
-        self.curves = {policy: self._curve(path, policy, by_round)
-                       for policy, by_round in returns.items()}
-        if not self.curves:
+        path = os.path.join(folder, "rounds.csv")
+        returns, steps = read_rounds(path)
+        if not steps:
             raise PlotError("%s holds no returns although the run has finished." % path)
-        self.returns = returns
-        self.num_tasks = 1 + max(task for by_round in returns.values()
-                                 for by_task in by_round.values() for task in by_task)
+        self.curves = with_stand_ins({key: self._curve(path, key, by_round)
+                                      for key, by_round in returns.items()})
+        self.returns = with_stand_ins(returns)
+        # of each task, up to each round
+        self.env_steps = np.array([np.mean(list(steps[r].values())) for r in self.rounds])
+        self.num_tasks = 1 + max(task for by_task in steps.values() for task in by_task)
+        self.num_tests = self._count_tests(path)
         self.task_names = _task_names(manifest, self.num_tasks)
+        self.test_names = _task_names(manifest, self.num_tasks + self.num_tests)[self.num_tasks:]
         path = os.path.join(folder, "final.csv")
-        self.fresh = read_fresh(path, self.num_tasks) if os.path.isfile(path) else {}
+        self.fresh = (read_fresh(path, self.num_tasks, self.num_tests) if os.path.isfile(path)
+                      else {})
 
-    def by_task(self, policy, snapshot):
+    def tasks_of(self, key):
+        """Numbers of the tasks that these returns are of; the test tasks follow the others."""
+        tests = range(self.num_tasks, self.num_tasks + self.num_tests)
+        return tests if split_of(key) == "test" else range(self.num_tasks)
+
+    def by_task(self, key, snapshot):
         """Return of each task on the evaluation episodes of a round; NaN if it did not report."""
-        curve = self.curves[policy]
+        # test tasks have no say in what is best
+        curve = self.curves["meta" if split_of(key) == "test" else key]
         place = int(np.argmax(curve)) if snapshot == "best" else len(curve) - 1
-        by_task = self.returns[policy][self.rounds[place]]
-        return np.array([by_task.get(task, math.nan) for task in range(self.num_tasks)])
+        by_task = self.returns[key][self.rounds[place]]
+        return np.array([by_task.get(task, math.nan) for task in self.tasks_of(key)])
 
-    def _curve(self, path, policy, by_round):
-        last = max(by_round)
+    def _count_tests(self, path):
+        tests = set(task for by_task in self.returns.get("meta_test", {}).values()
+                    for task in by_task)
+        if tests and min(tests) < self.num_tasks:
+            raise PlotError("%s: the test task %d does not follow the %d training tasks."
+                            % (path, min(tests), self.num_tasks))
+        return 1 + max(tests) - self.num_tasks if tests else 0
+
+    def _curve(self, path, key, by_round):
+        last, policy = max(by_round), words_of(key)
         if last != self.num_rounds:
             raise PlotError("%s ends with round %d (%s) but its manifest.json says %d rounds."
                             % (path, last, policy, self.num_rounds))
@@ -193,12 +218,13 @@ def _required(folder, manifest, key, kind):
 
 
 def _optimal_return(manifest):
-    """Mean over the tasks, or None unless every task knows its own."""
+    """Mean over the training tasks, or None unless every one knows its own."""
     tasks = manifest.get("tasks")
-    if not isinstance(tasks, list) or not tasks:
+    if not isinstance(tasks, list):
         return None
-    values = [task.get("optimal_return") if isinstance(task, dict) else None for task in tasks]
-    if not all(is_number(value) for value in values):
+    tasks = [task if isinstance(task, dict) else {} for task in tasks]
+    values = [task.get("optimal_return") for task in tasks if task.get("split") != "test"]
+    if not values or not all(is_number(value) for value in values):
         return None
     return float(np.mean(values))
 
@@ -240,11 +266,21 @@ class Group:
         self.runs = runs
         self.seeds = [run.seed for run in runs]
         self.label = ALGORITHMS.get(algorithm, algorithm.replace("_", " "))
-        self.policies = [p for p in ("personal", "meta") if all(p in r.curves for r in runs)]
+        self.policies = [p for p in POLICIES if all(p in r.curves for r in runs)]
 
     @property
     def rounds(self):
         return self.runs[0].rounds
+
+    @property
+    def env_steps(self):
+        """Environment steps of each task up to each round, mean over seeds."""
+        return np.mean([run.env_steps for run in self.runs], axis=0)
+
+    def adaptations(self, split):
+        """Numbers of exploration episodes that the meta-policy was tried after, ascending."""
+        return [count for count in adaptations(self.runs[0].curves, split)
+                if all((split, count) in run.curves for run in self.runs)]
 
     def curves(self, policy):
         """Seeds x rounds."""
@@ -304,10 +340,14 @@ def group_runs(runs):
                                    g.algorithm, [sort_key(g.settings.get(k)) for k in keys]))
         for group in groups:
             group.label = " ".join([group.label] + setting_texts(group, keys))
-            without = sum(not run.fresh for run in group.runs)
-            if 0 < without < len(group.runs):
-                warn("%d of the %d runs of %s, %s, have no final.csv: fresh returns are over the "
-                     "others." % (without, len(group.runs), experiment, group.label))
+            for known, what, returns in (
+                    ([bool(r.fresh) for r in group.runs], "final.csv", "fresh"),
+                    ([(OWN_BEST, "personal") in r.fresh for r in group.runs if r.fresh],
+                     "own_best in final.csv", "own best")):
+                if 0 < sum(known) < len(known):
+                    warn("%d of the %d runs of %s, %s, have no %s: %s returns are over the "
+                         "others." % (len(known) - sum(known), len(known), experiment, group.label,
+                                      what, returns))
             commits = sorted(set(run.commit for run in group.runs))
             if len(commits) > 1:
                 warn("the runs of %s, %s, come from %d versions of the code: %s."
@@ -396,14 +436,38 @@ def reference(groups):
     return candidates[(len(candidates) - 1) // 2]
 
 
-def baseline_of(group, groups, algorithm="model_averaging"):
-    """The group of `algorithm` with the settings of `group` in all that it uses, or None."""
-    unused = UNUSED.get(algorithm, set())
-    wanted = {k: v for k, v in group.settings.items() if k not in unused}
-    for other in groups:
-        if other.algorithm == algorithm and other.settings == wanted:
-            return other
-    return None
+def baseline_of(group, groups, algorithm="model_averaging", free=()):
+    """The group of `algorithm` with the settings of `group` in all that it uses, or None.
+
+    Those in `free` may differ; of several such groups, the one that goes furthest.
+    """
+    unused = UNUSED.get(algorithm, set()) | set(free)
+
+    def used(settings):
+        return {k: v for k, v in settings.items() if k not in unused}
+
+    found = [other for other in groups
+             if other.algorithm == algorithm and used(other.settings) == used(group.settings)]
+    return max(found, key=lambda other: other.env_steps[-1], default=None)
+
+
+def differ_in_length(groups):
+    """Do their rounds stand for different numbers of updates, or are there more of them?"""
+    return len(set(tuple(group.settings.get(k) for k in LENGTHS) for group in groups)) > 1
+
+
+def pmeta_only(groups):
+    return [group for group in groups if group.algorithm == "pmeta"]
+
+
+def chief(groups, limit):
+    """All groups in their order, or of too many the reference, its baselines, and the next."""
+    if len(groups) <= limit:
+        return groups
+    first = reference(pmeta_only(groups) or groups)
+    first = [first] + [baseline_of(first, groups, name) for name in ALGORITHMS]
+    chosen = [g for g in groups if g in first] + [g for g in groups if g not in first]
+    return [g for g in groups if g in chosen[:limit]]
 
 
 def slices(groups, key):

@@ -6,7 +6,7 @@ import pmeta_tables as pt
 from pmeta_files import read_text
 from pmeta_html import details, facts, heading, link, preformatted, table, text
 
-POLICY_WORDS = {"personal": "PP", "meta": "MP", "all": "all"}
+POLICY_WORDS = {"personal": "PP", "meta": "MP", "meta_test": "MP", "all": "all"}
 MANY_RUNS = 4  # more are folded away
 
 
@@ -40,8 +40,16 @@ def task_texts(groups):
     found = [group.runs[0] for group in groups]
     if len(set(tuple(run.task_names) for run in found)) > 1:
         return ["several sets, see below"]
-    return [text("task %d: %s" % (i, name) if name != "task %d" % i else name)
-            for i, name in enumerate(found[0].task_names)]
+    most = max(found, key=lambda run: run.num_tests)
+    return [text("%s: %s" % (head, name) if name != "task %d" % i else head)
+            for i, (head, name) in enumerate(zip(task_heads(most),
+                                                 most.task_names + most.test_names))]
+
+
+def task_heads(run):
+    """"task 0" of each training task, "test task 5" of each test task."""
+    return ["task %d" % i for i in run.tasks_of("personal")] + [
+        "test task %d" % i for i in run.tasks_of("meta_test")]
 
 
 def versions_text(run):
@@ -63,10 +71,9 @@ def number_ranges(values):
 
 def return_tables(experiment, rows):
     heads, lines = pt.best_cells(experiment, rows)
-    learning = [pt.learning_cells(row) for row in rows]
     return [heading(3, "Returns: best and last round"), html_table(heads, lines, words=2),
             heading(3, "Learning: mean over the rounds (AUC)"),
-            html_table(pt.LEARNING_HEADS, learning)]
+            html_table(*pt.learning_cells(rows))]
 
 
 def html_table(heads, lines, words=1):
@@ -86,12 +93,13 @@ def task_tables(experiment, groups):
             lines.setdefault(key, {})[row["task"]] = pt.plus_minus(row["mean"], row["std"])
         if len(by_names) > 1:
             found.append(facts(("task %d" % i, text(name)) for i, name in enumerate(names)))
+        heads = task_heads(max((g.runs[0] for g in members), key=lambda run: run.num_tests))
         made, last = [], None
         for key, cells in lines.items():
             label, last = "" if key[0] == last else key[0], key[0]
-            made.append((label,) + key[1:] + tuple(cells.get(i, "-") for i in range(len(names))))
-        found.append(html_table(("group", "policy", "round", "episodes") + tuple(
-            "task %d" % i for i in range(len(names))), made, words=4))
+            made.append((label,) + key[1:] + tuple(cells.get(i, "-") for i in range(len(heads))))
+        found.append(html_table(("group", "policy", "round", "episodes") + tuple(heads), made,
+                                words=4))
     return found
 
 

@@ -7,19 +7,28 @@ import os
 import numpy as np
 
 import pmeta_runs as pr
-from pmeta_files import SNAPSHOTS
+from pmeta_files import OWN_BEST, SNAPSHOTS
 
 WIDTH = 120
 BEST_HEADS = {"best": "best", "last": "last", "fresh_best": "fresh (best)",
-              "fresh_last": "fresh (last)"}
-LEARNING_HEADS = ("group", "seeds", "PP last", "MP last", "PP AUC", "MP AUC", "MP - MA", "PP - MA")
+              "fresh_own_best": "fresh (own best)", "fresh_last": "fresh (last)"}
+TEX_HEADS = {"best": "best", "fresh_best": "fresh", "fresh_own_best": "fresh, own best"}
+LEARNING = {  # head: columns of the mean and of its spread
+    "PP last": ("pp_last_mean", "pp_last_std"), "MP last": ("mp_last_mean", "mp_last_std"),
+    "MP test last": ("mp_test_last_mean", "mp_test_last_std"),
+    "PP AUC": ("pp_auc_mean", "pp_auc_std"), "MP AUC": ("mp_auc_mean", "mp_auc_std"),
+    "MP - MA": ("mp_minus_ma_auc", "mp_minus_ma_auc_se"),
+    "PP - MA": ("pp_minus_ma_auc", "pp_minus_ma_auc_se")}
 COLUMNS = ("experiment", "group", "algorithm", "lambda", "seeds", "pp_last_mean", "pp_last_std",
            "mp_last_mean", "mp_last_std", "pp_auc_mean", "pp_auc_std", "mp_auc_mean",
            "mp_auc_std", "pairs", "mp_minus_ma_auc", "mp_minus_ma_auc_se", "pp_minus_ma_auc",
            "pp_minus_ma_auc_se", "pp_best_mean", "pp_best_std", "mp_best_mean", "mp_best_std",
            "fresh_seeds") + tuple(
                "%s_fresh_%s_%s" % (name, snapshot, what) for snapshot in SNAPSHOTS
-               for name in ("pp", "mp", "all") for what in ("mean", "std"))
+               for name in ("pp", "mp", "all") for what in ("mean", "std")) + tuple(
+                   "%s_%s" % (measure, what) for measure in (
+                       "pp_fresh_own_best", "mp_test_last", "mp_test_fresh_best",
+                       "mp_test_fresh_last") for what in ("mean", "std"))
 TASK_COLUMNS = ("experiment", "group", "snapshot", "policies", "episodes", "task", "name", "seeds",
                 "mean", "std", "min", "max")
 
@@ -44,7 +53,7 @@ PAPER = {
                  ("pmeta", "mp"): (-107.15, 4.10), ("pmeta", "pp"): (-93.05, 0.95)}},
 }
 PAPER_LAMBDA = 20  # of its best table
-POLICIES = {"pp": "personal", "mp": "meta", "all": "all"}
+POLICIES = {"pp": "personal", "mp": "meta", "mp_test": "meta_test", "all": "all"}
 GREEK = {"α": r"$\alpha$", "β": r"$\beta$", "γ": r"$\gamma$", "η": r"$\eta$", "λ": r"$\lambda$"}
 
 
@@ -60,12 +69,14 @@ def summary_rows(experiments):
                 row["lambda"] = group.settings.get("personal.lambda")
             # only the summary's text and LaTeX ask for it
             row["learner"] = group.settings.get("learner")
+            row["adapts"] = len(group.adaptations("train")) > 1
             for name, policy in POLICIES.items():
                 if policy in group.policies:
-                    for measure in ("last", "auc", "best"):
+                    # of test tasks no round is chosen
+                    for measure in ("last", "auc", "best")[:1 if name == "mp_test" else None]:
                         _enter(row, "%s_%s" % (name, measure), getattr(group, measure)(policy))
                 # those of pMeta-RL are not run on each other's tasks, or not in every seed
-                for snapshot in SNAPSHOTS:
+                for snapshot in SNAPSHOTS + (OWN_BEST,):
                     _enter(row, "%s_fresh_%s" % (name, snapshot), group.fresh(snapshot, policy))
             if group.algorithm == "pmeta":
                 row.update(paired_differences(group, pr.baseline_of(group, groups)))
@@ -114,10 +125,10 @@ def summary_text(rows):
     for experiment in dict.fromkeys(row["experiment"] for row in rows):
         members = [row for row in rows if row["experiment"] == experiment]
         lines += ["experiment %s: learning" % experiment]
-        lines += aligned(LEARNING_HEADS, [learning_cells(row) for row in members])
+        lines += aligned(*learning_cells(members))
         lines += ["", "experiment %s: best returns" % experiment]
         # the last returns stand in the table above
-        lines += aligned(*best_cells(experiment, members, ("best", "fresh_best", "fresh_last")),
+        lines += aligned(*best_cells(experiment, members, [m for m in BEST_HEADS if m != "last"]),
                          left=2)
         lines.append("")
     return "\n".join(lines + legend_lines(rows)) + "\n"
@@ -130,10 +141,23 @@ def legend_lines(rows):
              "rounds. MP - MA, PP - MA: AUC less that of model averaging's meta-policy, paired by",
              "seed, as mean ± standard error. best: the largest in any round, on that round's",
              "evaluation episodes, as the paper has it."]
+    if any(row["mp_test_last_mean"] is not None for row in rows):
+        lines += ["MP test last, MP on test tasks: the same over the test tasks, which nobody",
+                  "trained on; they have no say in which round is best."]
+    if any(row["adapts"] for row in rows):
+        lines += ["MP is after adaptation from the most exploration episodes of the run."]
     if any(row["fresh_seeds"] for row in rows):
         lines += ["fresh (best), fresh (last): the policies of that round and of the last round,",
                   "on episodes that had no part in the choice."]
-    if any(row["all_fresh_best_mean"] is not None for row in rows):
+    if any(row["pp_fresh_own_best_mean"] is not None for row in rows):
+        lines += ["fresh (own best): the same where each robot keeps its personal policy of the",
+                  "round in which it did best on its own task."]
+    if any(row["all_fresh_best_mean"] is not None and row["algorithm"] == "pooled"
+           for row in rows):
+        lines += ["pooled DQN on all tasks: every pooled policy, which trained in environments of",
+                  "all tasks, on every task, mean over all pairs."]
+    if any(row["all_fresh_best_mean"] is not None and row["algorithm"] != "pooled"
+           for row in rows):
         lines += ["all: every personal policy on every task, mean over all pairs (the paper's DQN;",
                   "its DQN* is the PP of independent)."]
     if any(row["experiment"] in PAPER for row in rows):
@@ -143,25 +167,25 @@ def legend_lines(rows):
     return lines
 
 
-def learning_cells(row):
-    return (row["group"], str(row["seeds"])) + tuple(
-        plus_minus(row[mean], row[spread]) for mean, spread in (
-            ("pp_last_mean", "pp_last_std"), ("mp_last_mean", "mp_last_std"),
-            ("pp_auc_mean", "pp_auc_std"), ("mp_auc_mean", "mp_auc_std"),
-            ("mp_minus_ma_auc", "mp_minus_ma_auc_se"), ("pp_minus_ma_auc", "pp_minus_ma_auc_se")))
+def learning_cells(rows):
+    """(heads, lines): a line for each group; test tasks have a column where there are any."""
+    shown = {head: keys for head, keys in LEARNING.items()
+             if head != "MP test last" or any(row[keys[0]] is not None for row in rows)}
+    return ("group", "seeds") + tuple(shown), [
+        (row["group"], str(row["seeds"])) + tuple(
+            plus_minus(row[mean], row[spread]) for mean, spread in shown.values()) for row in rows]
 
 
 def best_cells(experiment, rows, measures=tuple(BEST_HEADS)):
     """(heads, lines): a line for each group and policy, the paper's numbers where there are any."""
-    measures = [m for m in measures
-                if not m.startswith("fresh") or any(row["fresh_seeds"] for row in rows)]
+    measures = known_measures(rows, measures)
     heads = ("group", "policy") + tuple(BEST_HEADS[m] for m in measures)
     if experiment in PAPER:
         heads += ("paper, λ", "paper, best")
     lines = []
     for row in rows:
         label = row["group"]
-        for name, policy in best_policies(row):
+        for name, policy in best_policies(row, measures):
             cells = (label, policy) + tuple(value_of(row, name, m) for m in measures)
             if experiment in PAPER:
                 cells += tuple(plus_minus(*pair) for pair in paper_values(row, name))
@@ -170,14 +194,23 @@ def best_cells(experiment, rows, measures=tuple(BEST_HEADS)):
     return heads, lines
 
 
-def best_policies(row):
-    """[(pp, mp or all, its name)] of which the group has a return."""
+def known_measures(rows, measures):
+    """Those of which a row has a return; fresh ones are shown together."""
+    fresh = any(row["fresh_seeds"] for row in rows)
+    own = any(row["pp_fresh_own_best_mean"] is not None for row in rows)
+    return [m for m in measures
+            if (own if m == "fresh_own_best" else fresh or not m.startswith("fresh"))]
+
+
+def best_policies(row, measures):
+    """[(pp, mp, mp_test or all, its name)] of which the group has a return."""
     deep = row["algorithm"] == "independent" and row["learner"] == "dqn"
-    names = {"pp": "PP (DQN*)" if deep else "PP", "mp": "MP",
+    names = {"pp": "PP (DQN*)" if deep else "PP", "mp": "MP", "mp_test": "MP on test tasks",
              "all": "all (DQN)" if deep else "all"}
+    if row["algorithm"] == "pooled":
+        names["all"] = "pooled DQN on all tasks"
     return [(name, text) for name, text in names.items()
-            if row["%s_fresh_best_mean" % name] is not None
-            or row.get("%s_best_mean" % name) is not None]
+            if any(row.get("%s_%s_mean" % (name, m)) is not None for m in measures)]
 
 
 def value_of(row, name, measure):
@@ -238,21 +271,24 @@ def latex_cell(row, name, measure, bold=False):
 def best_returns_tex(rows):
     """Rows algorithms and columns experiments, as the paper's table of best returns."""
     experiments = list(dict.fromkeys(row["experiment"] for row in rows))
-    columns = [(e, m) for e in experiments for m in ("best", "fresh_best") if m == "best" or any(
-        row["fresh_seeds"] for row in rows if row["experiment"] == e)]
+    columns = [(e, m) for e in experiments
+               for m in known_measures([r for r in rows if r["experiment"] == e], TEX_HEADS)]
     found = {}
     for row in rows:
-        for name, policy in best_policies(row):
+        for name, policy in best_policies(row, TEX_HEADS):
             found.setdefault("%s, %s" % (row["group"], policy), {})[row["experiment"]] = row, name
     lines = [" & ".join(["Algorithm"] + [r"\multicolumn{%d}{c}{%s}" % (
         sum(c[0] == e for c in columns), latex(e)) for e in experiments]) + r" \\"]
-    lines.append(" & ".join([""] + [BEST_HEADS[m].split(" ")[0] for _, m in columns]) + r" \\")
+    lines.append(" & ".join([""] + [TEX_HEADS[m] for _, m in columns]) + r" \\")
     lines.append(r"\midrule")
     for label, by_experiment in found.items():
         cells = [latex_cell(*by_experiment.get(e, (None, "")), m) for e, m in columns]
         lines.append(" & ".join([latex(label)] + cells) + r" \\")
     caption = ("Best average returns, mean $\\pm$ standard deviation over seeds. Best: the largest "
-               "in any round; fresh: the policies of that round on fresh episodes.")
+               "in any round; fresh: the policies of that round on fresh episodes")
+    if any(m == "fresh_own_best" for _, m in columns):
+        caption += "; own best: each robot's policy of the round in which it did best on its task"
+    caption += "."
     return latex_table(caption, "l" + "c" * len(columns), lines)
 
 
@@ -304,14 +340,16 @@ def task_rows(experiment, groups):
         for snapshot in SNAPSHOTS:
             for policies in POLICIES.values():
                 data = group.by_task(policies, snapshot)
-                for task in range(group.runs[0].num_tasks if data else 0):
-                    values = data[0][:, task]
+                names = group.runs[0].test_names if policies == "meta_test" else (
+                    group.runs[0].task_names)
+                for i, task in enumerate(group.runs[0].tasks_of(policies) if data else ()):
+                    values = data[0][:, i]
                     values = values[np.isfinite(values)]
                     if len(values):
                         std = float(values.std(ddof=1)) if len(values) > 1 else None
                         rows.append(dict(zip(TASK_COLUMNS, (
                             experiment, group.label, snapshot, policies, data[1], task,
-                            group.runs[0].task_names[task], len(values), float(values.mean()), std,
+                            names[i], len(values), float(values.mean()), std,
                             float(values.min()), float(values.max())))))
     return rows
 
