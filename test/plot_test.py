@@ -786,3 +786,18 @@ def test_convergence_without_a_manifest_has_not_finished(tmp_path, convergence):
 
 if __name__ == "__main__":
     sys.exit(pytest.main([__file__]))
+
+
+def test_rounds_that_did_not_evaluate_are_not_missed(tmp_path):
+    """With evaluation_interval 3, a run of 4 rounds has returns of the rounds 3 and 4."""
+    folder = write_run(tmp_path)
+    edit(folder, "config.yaml", lambda text: text + "evaluation_interval: 3\n")
+    edit(folder, "rounds.csv", lambda text: "".join(
+        line for line in text.splitlines(True) if not line.startswith(("1,", "2,"))))
+    plot(tmp_path, "--out", tmp_path / "out")
+    group, = groups_of(tmp_path)["grid"]
+    assert list(group.rounds) == [3, 4]
+    assert list(group.curves("meta")[0]) == curve(folder, "meta")
+    edit(folder, "rounds.csv", lambda text: "".join(
+        line for line in text.splitlines(True) if not line.startswith("3,")))
+    assert "has no" in fails(tmp_path, "--out", tmp_path / "out")

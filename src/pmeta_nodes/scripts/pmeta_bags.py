@@ -29,7 +29,7 @@ class BagRun:
             raise PlotError("%s has no round with returns of every policy." % path)
         lacking = sorted(set(range(1, self.rounds[-1] + 1)) - set(self.rounds))
         if lacking:
-            warn("%s lacks %d of the first %d rounds (first: round %d): they were not recorded."
+            warn("%s lacks %d of the first %d rounds (first: round %d): they were not recorded, or not evaluated."
                  % (path, len(lacking), self.rounds[-1], lacking[0]))
         for key, by_round in returns.items():
             tasks = max(len(by_task) for by_task in by_round.values())

@@ -97,7 +97,10 @@ class Run:
         self.started = str(manifest.get("started") or "")
         self.commit = str(manifest.get("commit") or "unknown")
         self.optimal = _optimal_return(manifest)
-        self.rounds = np.arange(1, self.num_rounds + 1)
+        # those that evaluated: every k-th and the last
+        interval = int(self.settings.get("evaluation_interval", 1))
+        self.rounds = np.array([r for r in range(1, self.num_rounds + 1)
+                                if r % interval == 0 or r == self.num_rounds])
         path = os.path.join(folder, "rounds.csv")
         returns, steps = read_rounds(path)
         if not steps:
