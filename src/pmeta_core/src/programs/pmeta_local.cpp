@@ -204,7 +204,11 @@ int check(Arguments arguments) {
 
 int settings(const Arguments& arguments) {
   const std::string environment = arguments.words.empty() ? "gridworld" : arguments.words[0];
-  const std::string learner = environment == "gridworld" ? "q_learning" : "dqn";
+  const auto family = pmeta::makeEnvFamily(environment);
+  family->build(0);
+  const bool continuous = family->make(0)->spec().num_actions == 0;
+  const std::string learner =
+      environment == "gridworld" ? "q_learning" : (continuous ? "sac" : "dqn");
   std::cout << Experiment::describe(environment, learner);
   return 0;
 }
