@@ -75,7 +75,7 @@ void TabularRound(benchmark::State& state) {
   std::int64_t samples = 0;
   const double seconds = callSeconds(state, 1, [&] {
     auto result = agent.trainRound(meta);
-    samples = result->personal.env_steps;
+    samples = result->env_steps;
     benchmark::DoNotOptimize(result);
   });
   report({Part::kLoops, 31}, "tabular round, 8 x 8, " + std::to_string(samples) + " samples",

@@ -16,7 +16,7 @@ void SacUpdateOf(benchmark::State& state) {
   ceiling = std::max(ceiling, sgemmCeiling(batch));
   adam = std::min(adam, update.adamSeconds());
   const std::string size = std::to_string(units);
-  report({Part::kLoops, units == 512 ? 20 : 21},
+  report({Part::kLoops, units == 512 ? 4 : 5},
          "SAC update, 25+6, [" + size + "," + size + "], batch " + std::to_string(batch),
          Unit::kSeconds, seconds, update.flops() / ceiling + adam, "products, then Adam");
 }
@@ -33,7 +33,7 @@ void SacStep(benchmark::State& state) {
   double read = readSeconds(actor);
   const double seconds = callSeconds(state, 4, [&] { sac.collect(); });
   read = std::min(read, readSeconds(actor));
-  report({Part::kLoops, 22}, "SAC step: sample of 25-512-512-12, stored", Unit::kSeconds, seconds,
+  report({Part::kLoops, 12}, "SAC step: sample of 25-512-512-12, stored", Unit::kSeconds, seconds,
          read, "reading the actor once");
 }
 BENCHMARK(SacStep)->Unit(benchmark::kMicrosecond);
@@ -57,7 +57,7 @@ void ContextInference(benchmark::State& state) {
   ceiling = std::max(ceiling, sgemmCeiling(rows));
   // multiply-adds: the weights, once for each row
   const double flops = 2.0 * static_cast<double>(rows) * static_cast<double>(parameters.size());
-  report({Part::kLoops, 23}, "context encoding, 100 rows, 32-200-200-200-10", Unit::kSeconds,
+  report({Part::kLoops, 7}, "context encoding, 100 rows, 32-200-200-200-10", Unit::kSeconds,
          seconds, flops / ceiling, "its products");
 }
 BENCHMARK(ContextInference)->Unit(benchmark::kMicrosecond);
@@ -68,7 +68,7 @@ void SacUpdateWithEncoder(benchmark::State& state) {
   double plain = callSeconds(20, 1, without);
   const double seconds = callSeconds(state, 1, update);
   plain = std::min(plain, callSeconds(20, 1, without));
-  report({Part::kLoops, 24}, "SAC update with the context encoder, batch 256", Unit::kSeconds,
+  report({Part::kLoops, 6}, "SAC update with the context encoder, batch 256", Unit::kSeconds,
          seconds, plain, "the update without it");
 }
 BENCHMARK(SacUpdateWithEncoder)->Unit(benchmark::kMicrosecond);

@@ -38,7 +38,7 @@ class NoiseEnv : public pmeta::Env {
 };
 
 /// SacLearner's update by Adam with pull, auxiliary and targets: actor and twin critics of two
-/// hidden layers of `units`, 25 observations, 6 actions.
+/// hidden layers of `units`, 25 observations, 6 actions. peers.py does the same in PyTorch.
 class SacUpdate {
  public:
   SacUpdate(std::size_t units, std::size_t batch, const std::string& task_encoding)
