@@ -192,5 +192,28 @@ TEST(TaskAgent, WatchingDoesNotChangeTraining) {
   }
 }
 
+TEST(TaskAgent, TasksThatTheMetaPolicyLagsOnCountMore) {
+  const Experiment experiment = gridExperiment({"catch_up:=0.5"});
+  TaskAgent agent(experiment, 1);
+  MetaPolicy meta = MetaAggregator(experiment).metaPolicy();
+  EXPECT_EQ(agent.trainRound(meta)->update.weight, 1) << "nothing to compare with yet";
+  double log_weight = 0;
+  for (int round = 1; round <= 3; ++round) {
+    meta.round = round;
+    const double behind = agent.evaluateMeta(meta).back().mean;
+    const auto result = agent.trainRound(meta);
+    const double personal = result->personal->mean;
+    ASSERT_GT(personal, behind) << "the initial table knows nothing";
+    const double gap = std::min(1.0, (personal - behind) / std::abs(personal));
+    log_weight = 0.8 * log_weight + 0.5 * gap;
+    EXPECT_NEAR(result->update.weight, std::exp(log_weight), 1e-12);
+  }
+  // a meta-policy as good as the personal one lets the weight fade
+  meta.model = agent.personal();
+  meta.round = 4;
+  agent.evaluateMeta(meta);
+  EXPECT_LT(agent.trainRound(meta)->update.weight, std::exp(log_weight));
+}
+
 }  // namespace
 }  // namespace pmeta

@@ -139,6 +139,12 @@ void Experiment::bind(Settings& s) {
   s.bind("aggregation.round_timeout", e.aggregation.round_timeout,
          "seconds after which a round counts as late", Range::above(0));
 
+  s.bind(
+      "aggregation.catch_up", e.aggregation.catch_up,
+      "how much more a task counts while the meta-policy lags behind its personal policy; 0: all "
+      "tasks count the same",
+      Range::between(0, 10));
+
   s.bind("environment.name", e.environment, "family of environments", envFamilyNames());
   family_->bind(s);
 }

@@ -20,6 +20,9 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+// of the last round's log weight, what stays in this one's
+constexpr double kWeightMemory = 0.8;
+
 }  // namespace
 
 TaskAgent::TaskAgent(const Experiment& experiment, int task)
@@ -32,6 +35,7 @@ TaskAgent::TaskAgent(const Experiment& experiment, int task)
       sends_personal_(experiment.sendsPersonal()),
       evaluation_interval_(experiment.settings().evaluation_interval),
       rounds_(experiment.settings().rounds),
+      catch_up_(experiment.settings().aggregation.catch_up),
       learner_(experiment.makeLearner(task)) {}
 
 std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& meta,
@@ -62,14 +66,16 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
     personal.env_steps = std::exchange(env_steps_, 0);
     personal.updates = std::exchange(updates_, 0);
     personal.seconds = watch.seconds();
+    adjustWeight(personal.mean);
     result.personal = std::move(personal);
   }
   result.update = {run_id_, task_, round,
-                   sends_personal_ ? learner_->personal() : learner_->auxiliary(), 1.0};
+                   sends_personal_ ? learner_->personal() : learner_->auxiliary(),
+                   std::exp(log_weight_)};
   return result;
 }
 
-std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) const {
+std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) {
   checkModel(meta.model, learner_->layout(), "the aggregator");
   std::vector<TaskReturn> results;
   if (!evaluates(meta.round)) return results;
@@ -80,6 +86,7 @@ std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) const {
     results.back().context_episodes = adapted.context_episodes;
     results.back().seconds = watch.seconds();
   }
+  meta_return_ = results.back().mean;
   return results;
 }
 
@@ -110,6 +117,15 @@ Episode TaskAgent::recordMeta(const MetaPolicy& meta) const {
   checkModel(meta.model, learner_->layout(), "the aggregator");
   Rng rng = evaluationRng();
   return learner_->record(meta.model, rng);
+}
+
+// log w <- 0.8 log w + catch_up * gap, where gap in [0, 1] is how far the meta-policy that this
+// round began with lies behind the personal policy, as a share of the latter's return
+void TaskAgent::adjustWeight(double personal_return) {
+  if (!meta_return_ || catch_up_ == 0) return;
+  const double scale = std::max(std::abs(personal_return), 1e-9);
+  const double gap = std::clamp((personal_return - *meta_return_) / scale, 0.0, 1.0);
+  log_weight_ = kWeightMemory * log_weight_ + catch_up_ * gap;
 }
 
 bool TaskAgent::evaluates(int round) const {

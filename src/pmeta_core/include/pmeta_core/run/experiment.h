@@ -21,6 +21,8 @@ struct AggregationSettings {
   double beta = 1;            ///< mixing: meta <- (1 - beta) meta + beta mean
   int quorum = 0;             ///< updates that suffice once round_timeout has passed; 0 means all
   double round_timeout = 30;  ///< seconds before a round counts as late
+  double catch_up =
+      0;  ///< how much more tasks count on which the meta-policy lags; 0: all the same
 };
 
 /// Everything that defines a run, with defaults.

@@ -39,7 +39,7 @@ class TaskAgent {
 
   /// The meta-policy on this task: one return for each of Experiment::contextEpisodes(), or none
   /// in a round that does not evaluate.
-  std::vector<TaskReturn> evaluateMeta(const MetaPolicy& meta) const;
+  std::vector<TaskReturn> evaluateMeta(const MetaPolicy& meta);
 
   /// A policy on this task, on at least `episodes` episodes that no round evaluates; a meta-policy
   /// after the most exploration episodes it is evaluated after.
@@ -55,6 +55,7 @@ class TaskAgent {
 
  private:
   bool evaluates(int round) const;
+  void adjustWeight(double personal_return);
   Rng evaluationRng() const;
   TaskReturn makeReturn(int round, Policy policy, const ReturnStats& stats) const;
 
@@ -69,6 +70,9 @@ class TaskAgent {
   int rounds_;
   std::int64_t env_steps_ = 0;  // since the last evaluation
   std::int64_t updates_ = 0;
+  double catch_up_;
+  double log_weight_ = 0;              // of this task's updates in the mean
+  std::optional<double> meta_return_;  // the newest on this task
   std::unique_ptr<PersonalLearner> learner_;
 };
 
