@@ -129,7 +129,7 @@ TEST(TaskAgent, StopsWhenToldSo) {
 
 TEST(TaskAgent, EvaluatesTheMetaPolicyOnItsTask) {
   const Experiment experiment = gridExperiment();
-  const TaskAgent agent(experiment, 2);
+  TaskAgent agent(experiment, 2);
   const MetaPolicy meta = laterMeta(experiment, 3);
   const std::vector<TaskReturn> results = agent.evaluateMeta(meta);
   ASSERT_EQ(results.size(), 1u);

@@ -86,7 +86,7 @@ std::vector<Adaptation> adapt(const SacNetworks& networks, const ContextSettings
   for (int episode = 0;; ++episode) {
     encoder.infer(parameters + networks.encoderOffset(), explorer.context().data(), explorer.rows(),
                   workspace, posterior);
-    if (episode == 0 || std::count(counts.begin(), counts.end(), episode) > 0) {
+    if (std::count(counts.begin(), counts.end(), episode) > 0) {
       known.push_back({episode, {posterior.mean.begin(), posterior.mean.end()}});
     }
     if (counts.empty() || episode >= counts.back()) return known;

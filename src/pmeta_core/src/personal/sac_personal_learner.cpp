@@ -141,7 +141,9 @@ std::vector<AdaptedReturn> SacPersonalLearner::evaluateAdapted(const Model& poli
                                                                Rng& rng) const {
   if (!learner_.networks().hasEncoder()) return {{0, evaluate(policy, rng)}};
   const Rng starts = rng;
-  std::vector<AdaptedReturn> returns;
+  // before exploring there is the prior's mean; `rng` moves on, away from the starts
+  const std::vector<float> unknown(learner_.networks().encoder().latentSize());
+  std::vector<AdaptedReturn> returns = {{0, evaluation_->run(greedy(policy, unknown), rng)}};
   for (const Adaptation& adaptation : adapt(learner_.networks(), learner_.settings().context,
                                             policy.floats().data(), *exploration_env_, rng)) {
     Rng same_starts = starts;

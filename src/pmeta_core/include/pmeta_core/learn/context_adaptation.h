@@ -10,13 +10,13 @@ namespace pmeta {
 
 /// What a policy knows of a task after some episodes of exploration.
 struct Adaptation {
-  int episodes = 0;           ///< 0: nothing
-  std::vector<float> latent;  ///< z to act with: the mean of q(z|c), at first the prior's, 0
+  int episodes = 0;
+  std::vector<float> latent;  ///< z to act with: the mean of q(z|c)
 };
 
 /// Adapts to the task of `env` as at PEARL's test time: explores with z drawn from the prior in the
 /// first episode, and from the posterior of all transitions before in each later one. Gives what is
-/// known before exploring and after each of settings.exploration_episodes.
+/// known after each of settings.exploration_episodes; before there is the prior's mean, 0.
 ///
 /// Episodes act by tanh(mean), or by samples of the policy with settings.exploration_noise.
 /// `parameters` (personal or meta) stay as they are. Throws Error if `networks` has no encoder.
