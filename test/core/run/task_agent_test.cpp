@@ -208,11 +208,22 @@ TEST(TaskAgent, TasksThatTheMetaPolicyLagsOnCountMore) {
     log_weight = 0.8 * log_weight + 0.5 * gap;
     EXPECT_NEAR(result->update.weight, std::exp(log_weight), 1e-12);
   }
-  // a meta-policy as good as the personal one lets the weight fade
-  meta.model = agent.personal();
-  meta.round = 4;
-  agent.evaluateMeta(meta);
-  EXPECT_LT(agent.trainRound(meta)->update.weight, std::exp(log_weight));
+  // a meta-policy that is ahead lets the weight fade
+  MetaPolicy ahead = meta;
+  for (int round = 4; round < 20; ++round) {
+    ahead.round = round;
+    agent.trainRound(ahead);
+    ahead.model = agent.personal();
+  }
+  TaskAgent other(experiment, 1);
+  meta.round = 1;
+  other.evaluateMeta(meta);
+  const double weight = other.trainRound(meta)->update.weight;
+  ASSERT_GT(weight, 1);
+  ahead.round = 2;
+  other.evaluateMeta(ahead);
+  meta.round = 2;
+  EXPECT_NEAR(other.trainRound(meta)->update.weight, std::pow(weight, 0.8), 1e-12);
 }
 
 }  // namespace
