@@ -105,6 +105,50 @@ TEST(Cards, LanesKeepApartOnTheirCard) {
   }
 }
 
+TEST(Cards, SayReturnsAndTheRoundWhereItIsNotTheTitles) {
+  const pmeta::Experiment cheetahs =
+      experiment("environment: {name: half_cheetah_vel, velocities: [1.2345678, 2]}\nlearner: sac");
+  const Cards cards = layoutCards(2, 2, 2, 3, 2);
+  SceneContent content = contentOf(2);
+  pmeta_msgs::TaskReturn result;
+  result.round = 7;
+  result.return_mean = -0.001;
+  content.tasks[1].meta.result = boost::make_shared<pmeta_msgs::TaskReturn>(result);
+  const auto draw = [&] {
+    MarkerArray scene;
+    drawCards(cards, cheetahs.family(), content, scene);
+    return scene;
+  };
+  EXPECT_EQ("meta: round 7, return 0.00", find(draw(), "results", 3).text);
+  EXPECT_EQ("personal: no round yet", find(draw(), "results", 2).text);
+  pmeta_msgs::RoundSummary summary;
+  summary.round = 7;
+  content.summary = boost::make_shared<pmeta_msgs::RoundSummary>(summary);
+  EXPECT_EQ("meta return 0.00", find(draw(), "results", 3).text);
+  content.has_meta = false;
+  content.tasks[1].meta.result.reset();
+  EXPECT_EQ("meta: no meta-policy here", find(draw(), "results", 3).text);
+  EXPECT_EQ("half_cheetah_vel_0", find(draw(), "names", 0).text);
+  EXPECT_EQ("run at 1.235 m/s", find(draw(), "descriptions", 0).text);
+  EXPECT_EQ("run at 2 m/s", find(draw(), "descriptions", 1).text);
+}
+
+TEST(Cards, LeaveOutWhatStandsBeforeAColonWhereADescriptionIsTooLong) {
+  const pmeta::Experiment walkers =
+      experiment("environment: {name: walker_2d_params, task_seeds: [1234567]}\nlearner: sac");
+  const std::string whole = walkers.family().taskDescription(0);
+  const auto description = [&](int tasks) {
+    MarkerArray scene;
+    Cards cards = layoutCards(tasks, tasks, 2, 3, 2);
+    cards.num_tasks = 1;
+    drawCards(cards, walkers.family(), contentOf(tasks), scene);
+    return find(scene, "descriptions", 0).text;
+  };
+  ASSERT_NE(std::string::npos, whole.find("1234567: ")) << whole;
+  EXPECT_EQ(whole, description(1));
+  EXPECT_EQ(whole.substr(whole.find(": ") + 2), description(40));
+}
+
 TEST(Cards, TestTasksHaveOnlyTheMetaPolicy) {
   const Cards cards = layoutCards(3, 2, 2, 1, 1);
   EXPECT_EQ(2u, policiesOf(cards, 1).size());

@@ -51,7 +51,7 @@ inline SceneContent contentOf(int tasks) {
   return content;
 }
 
-inline const Marker& find(const MarkerArray& scene, const std::string& ns, int id) {
+inline Marker find(const MarkerArray& scene, const std::string& ns, int id) {
   for (const Marker& marker : scene.markers) {
     if (marker.ns == ns && marker.id == id) return marker;
   }

@@ -1,6 +1,8 @@
 #include "card.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 
 namespace pmeta_nodes {
 
@@ -28,7 +30,7 @@ Cards arrange(int num_tasks, int num_train, int lanes, int columns, bool beside)
   const int rows = (num_tasks + columns - 1) / columns;
   cards.slot_width = kSceneWidth / columns;
   cards.slot_height = (kSceneHeight - kTitleHeight - kLegendHeight) / rows;
-  cards.letter = std::min(0.18, 0.07 * cards.slot_height);
+  cards.letter = std::min(0.18, 0.08 * cards.slot_height);
   const double width = cards.width() - 2 * kPadding;
   const double height = cards.height() - kPadding - kHeader * cards.letter;
   const int across = beside ? lanes : 1;
@@ -38,17 +40,52 @@ Cards arrange(int num_tasks, int num_train, int lanes, int columns, bool beside)
   return cards;
 }
 
+/// The text with its long decimals rounded to four digits.
+std::string shortNumbers(const std::string& text) {
+  constexpr std::size_t kLong = 7;
+  std::string out;
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t end = std::min(text.find_first_not_of("0123456789.", i), text.size());
+    const std::string word = text.substr(i, end - i);
+    if (word.size() < kLong || word.find('.') == std::string::npos) {
+      out += word;
+    } else {
+      char rounded[32];
+      std::snprintf(rounded, sizeof rounded, "%.4g", std::strtod(word.c_str(), nullptr));
+      out += rounded;
+    }
+    if (end < text.size()) out += text[end];
+    i = end + 1;
+  }
+  return out;
+}
+
+/// A task's description as it fits on a card: where it is too long, what stands before a colon is
+/// left out.
+std::string shortDescription(const std::string& description, double letter, double width) {
+  constexpr double kReadable = 0.75;
+  const std::string text = shortNumbers(description);
+  const std::size_t colon = text.find(": ");
+  const bool fits = kLetterWidth * static_cast<double>(text.size()) * kReadable * letter <= width;
+  return fits || colon == std::string::npos ? text : text.substr(colon + 2);
+}
+
+/// The round is named only where it is not the one that the title names.
 std::string labelText(const Cards& cards, const SceneContent& content, int task, int policy) {
   const bool is_meta = policy == Trajectory::META;
   if (!is_meta && cards.isTest(task)) return "";
-  return std::string(is_meta ? "meta: " : "personal: ") +
-         resultText(viewOf(content, task, policy), content, is_meta);
+  const PolicyView& view = viewOf(content, task, policy);
+  const std::string name = is_meta ? "meta" : "personal";
+  if (view.result && content.summary && view.result->round == content.summary->round) {
+    return name + " return " + number(view.result->return_mean);
+  }
+  return name + ": " + resultText(view, content, is_meta);
 }
 
 /// What is known of both policies, above their lanes, in letters of one height.
 void drawLabels(const Cards& cards, int task, const SceneContent& content, MarkerArray& scene) {
   const bool shared = cards.lanes == 1 && !cards.isTest(task);
-  const double width = (shared ? 0.48 : 0.97) * cards.lane_width;
+  const double width = (shared ? 0.49 : 0.97) * cards.lane_width;
   std::size_t longest = 1;
   for (const int policy : policiesOf(cards, task)) {
     longest = std::max(longest, labelText(cards, content, task, policy).size());
@@ -132,7 +169,8 @@ void drawCards(const Cards& cards, const pmeta::EnvFamily& family, const SceneCo
                                        kInk));
     scene.markers.push_back(
         textMarker(taskFrame(task), "descriptions", task, {0, y - 1.95 * cards.letter}, kTextLayer,
-                   family.taskDescription(task), 0.95 * cards.letter, width, kFaint));
+                   shortDescription(family.taskDescription(task), cards.letter, width),
+                   0.95 * cards.letter, width, kFaint));
     drawLabels(cards, task, content, scene);
   }
 }

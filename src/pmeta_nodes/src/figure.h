@@ -15,7 +15,7 @@ using Color = std_msgs::ColorRGBA;
 constexpr double kPi = 3.14159265358979323846;
 
 /// Width of a letter, in heights, on average.
-constexpr double kLetterWidth = 0.5;
+constexpr double kLetterWidth = 0.46;
 
 /// 0xrrggbb, opaque.
 Color rgb(unsigned hex);

@@ -6,6 +6,8 @@
 #include "cart_pole_scene.h"
 #include "gridworld_scene.h"
 #include "mountain_car_scene.h"
+#include "robot_scene.h"
+#include "sparse_point_scene.h"
 
 namespace pmeta_nodes {
 
@@ -22,7 +24,10 @@ std::unique_ptr<Scene> makeScene(const pmeta::Experiment& experiment) {
   if (const auto* cars = dynamic_cast<const pmeta::MountainCarFamily*>(&family)) {
     return std::make_unique<MountainCarScene>(*cars);
   }
-  return nullptr;
+  if (const auto* points = dynamic_cast<const pmeta::SparsePointFamily*>(&family)) {
+    return std::make_unique<SparsePointScene>(*points, experiment.totalTasks());
+  }
+  return makeRobotScene(family, experiment.totalTasks());
 }
 
 std::size_t numSteps(const Trajectory& trajectory) { return trajectory.rewards.size(); }

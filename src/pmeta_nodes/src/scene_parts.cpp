@@ -31,7 +31,7 @@ std::string number(double value) {
   if (!std::isfinite(value)) return "-";
   char text[32];
   std::snprintf(text, sizeof text, std::abs(value) < 1e5 ? "%.2f" : "%.3g", value);
-  return text;
+  return std::string(text) == "-0.00" ? "0.00" : text;
 }
 
 std::string policyFrame(int task, int policy) {
