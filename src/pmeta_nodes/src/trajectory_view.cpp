@@ -124,12 +124,12 @@ void TrajectoryView::play(const ros::WallTimerEvent&) {
   const ros::WallTime now = ros::WallTime::now();
   const double passed = std::min((now - last_play_).toSec(), kLongestPlayStep);
   last_play_ = now;
-  if (moving_markers_.getNumSubscribers() == 0) return;
   std::vector<double> seconds;
   for (std::size_t task = 0; task < playbacks_.size(); ++task) {
     if (playbacks_[task].advance(speed_ * passed)) takeShown(task);
     seconds.push_back(playbacks_[task].seconds());
   }
+  if (moving_markers_.getNumSubscribers() == 0) return;
   moving_markers_.publish(scene_->moving(content_, seconds));
 }
 
