@@ -293,3 +293,34 @@ def test_nodes_say_what_they_miss(tmp_path):
         master.terminate()
         master.wait(timeout=20)
 
+
+BAD_SCREENSHOTS = [
+    ([], "which experiment?"),
+    (["gridwold"], "unknown experiment 'gridwold'"),
+    (["gridworld", "-o"], "-o needs a file."),
+    (["gridworld", "-o", "/no/such/folder/picture.png"], "there is no folder /no/such/folder"),
+    (["gridworld", "picture.png"], "'picture.png' is not an assignment: write key:=value."),
+]
+
+
+@pytest.mark.parametrize("words,sentence", BAD_SCREENSHOTS)
+def test_screenshot_says_what_is_wrong(words, sentence):
+    result = run([TOP / "pmeta", "screenshot"] + words)
+    assert result.returncode == 1
+    assert sentence in result.stderr
+
+
+@pytest.mark.skipif(shutil.which("Xvfb") is None or shutil.which("import") is None,
+                    reason="needs xvfb and imagemagick")
+def test_a_screenshot_shows_both_policies_in_rviz(tmp_path):
+    image = pytest.importorskip("matplotlib.image")
+    picture = tmp_path / "carts.png"
+    result = run([TOP / "pmeta", "screenshot", "cart_pole", "rounds:=1", "updates_per_round:=5",
+                  "-o", picture], timeout=300)
+    assert result.returncode == 0, result.stdout + result.stderr
+    pixels = (image.imread(str(picture))[:, :, :3] * 255).round().astype(int)
+    assert pixels.shape == (800, 1200, 3)
+    # carts, labels and legend in the colours of the personal policies and the meta-policy
+    for red, green, blue in ((216, 27, 96), (11, 79, 179)):
+        near = abs(pixels - (red, green, blue)).max(axis=2) < 12
+        assert near.sum() > 500, (red, green, blue, near.sum())

@@ -119,6 +119,8 @@ TEST(Conversions, TrajectoriesCarryTheEpisodeAndItsTask) {
   episode.observations = {0, 0, 0, 1};
   episode.actions = {3};
   episode.rewards = {-5};
+  episode.position_size = 3;
+  episode.positions = {1, 2, 3, 4, 5, 6};
   episode.truncated = true;
   episode.state_values = {-1, -2};
   episode.greedy_actions = {3, -1};
@@ -134,6 +136,8 @@ TEST(Conversions, TrajectoriesCarryTheEpisodeAndItsTask) {
   EXPECT_EQ(msg.observations, episode.observations);
   EXPECT_EQ(msg.actions, episode.actions);
   EXPECT_EQ(msg.rewards, episode.rewards);
+  EXPECT_EQ(msg.position_size, 3u);
+  EXPECT_EQ(msg.positions, episode.positions);
   EXPECT_EQ(msg.state_values, episode.state_values);
   EXPECT_EQ(msg.greedy_actions, episode.greedy_actions);
   EXPECT_EQ(msg.episode_return, -5);

@@ -1,4 +1,5 @@
 #include "gridworld_scene.h"
+#include "scene_parts.h"
 
 #include <gtest/gtest.h>
 #include <boost/make_shared.hpp>
@@ -264,7 +265,7 @@ TEST(GridworldScene, FramesPutPersonalAboveMetaAndKeepGridsApart) {
     ASSERT_EQ(2u * tasks, frames.size());
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const auto& a = frames[i].transform.translation;
-      EXPECT_EQ(gridFrame(i / 2, i % 2 == 0 ? Trajectory::PERSONAL : Trajectory::META),
+      EXPECT_EQ(policyFrame(i / 2, i % 2 == 0 ? Trajectory::PERSONAL : Trajectory::META),
                 frames[i].child_frame_id);
       EXPECT_GE(a.x, -kSceneWidth / 2);
       EXPECT_LE(a.x + side, kSceneWidth / 2);

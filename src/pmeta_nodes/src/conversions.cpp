@@ -177,6 +177,8 @@ pmeta_msgs::Trajectory toMsg(const pmeta::Episode& episode, const pmeta::Experim
   msg.action_size = static_cast<std::uint32_t>(episode.action_size);
   msg.actions = episode.actions;
   msg.rewards = episode.rewards;
+  msg.position_size = static_cast<std::uint32_t>(episode.position_size);
+  msg.positions = episode.positions;
   msg.terminated = episode.terminated;
   msg.truncated = episode.truncated;
   msg.episode_return = std::accumulate(episode.rewards.begin(), episode.rewards.end(), 0.0);

@@ -48,7 +48,6 @@ Marker makeMarker(const std::string& frame, const std::string& ns, int id) {
 Marker textMarker(const std::string& frame, const std::string& ns, int id, const Point& at,
                   double layer, const std::string& text, double height, double width,
                   const Color& color) {
-  constexpr double kLetterWidth = 0.5;  // of its height, on average
   Marker marker = makeMarker(frame, ns, id);
   marker.type = Marker::TEXT_VIEW_FACING;
   marker.action = text.empty() ? Marker::DELETE : Marker::ADD;

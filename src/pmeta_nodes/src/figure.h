@@ -14,6 +14,9 @@ using Color = std_msgs::ColorRGBA;
 
 constexpr double kPi = 3.14159265358979323846;
 
+/// Width of a letter, in heights, on average.
+constexpr double kLetterWidth = 0.46;
+
 /// 0xrrggbb, opaque.
 Color rgb(unsigned hex);
 
@@ -66,9 +69,31 @@ class Figure {
   }
 
   void disc(const Point& centre, double radius, const Color& color) {
-    std::vector<Point> rim;
-    for (int i = 0; i < 20; ++i) rim.push_back(polar(centre, radius, 2 * kPi * i / 20));
-    polygon(centre, rim, color);
+    sector(centre, radius, 0, 2 * kPi, color);
+  }
+
+  /// The part of a disc from angle `from` to angle `to`.
+  void sector(const Point& centre, double radius, double from, double to, const Color& color) {
+    constexpr int kCorners = 20;
+    Point before = polar(centre, radius, from);
+    for (int i = 1; i <= kCorners; ++i) {
+      const Point next = polar(centre, radius, from + (to - from) * i / kCorners);
+      triangle(centre, before, next, color);
+      before = next;
+    }
+  }
+
+  /// A circle as a line, which lies inside `radius`.
+  void ring(const Point& centre, double radius, double width, const Color& color) {
+    constexpr int kCorners = 32;
+    for (int i = 0; i < kCorners; ++i) {
+      const double from = 2 * kPi * i / kCorners;
+      const double to = 2 * kPi * (i + 1) / kCorners;
+      const Point inner = polar(centre, radius - width, from);
+      const Point outer = polar(centre, radius, to);
+      triangle(inner, polar(centre, radius, from), outer, color);
+      triangle(inner, outer, polar(centre, radius - width, to), color);
+    }
   }
 
   /// A star of five points, one of them up.
@@ -87,6 +112,12 @@ class Figure {
     const double dy = (to.x - from.x) / length * width / 2;
     triangle({from.x + dx, from.y + dy}, {from.x - dx, from.y - dy}, {to.x - dx, to.y - dy}, color);
     triangle({from.x + dx, from.y + dy}, {to.x - dx, to.y - dy}, {to.x + dx, to.y + dy}, color);
+  }
+
+  void polyline(const std::vector<Point>& points, double width, const Color& color) {
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      segment(points[i - 1], points[i], width, color);
+    }
   }
 
   /// An x.
@@ -110,6 +141,14 @@ class Figure {
     const Point foot = polar(centre, -length / 2, angle);
     triangle(polar(foot, length / 2, angle + kPi / 2), polar(foot, -length / 2, angle + kPi / 2),
              polar(centre, length / 2, angle), color);
+  }
+
+  /// Places the figure's origin at `at` of its frame, turned by `angle`.
+  void place(const Point& at, double angle) {
+    marker_.pose.position.x = at.x;
+    marker_.pose.position.y = at.y;
+    marker_.pose.orientation.z = std::sin(angle / 2);
+    marker_.pose.orientation.w = std::cos(angle / 2);
   }
 
   /// An empty figure deletes what stood in its place.

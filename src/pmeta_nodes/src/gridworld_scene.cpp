@@ -6,20 +6,16 @@
 #include <set>
 #include <utility>
 
-#include "figure.h"
+#include "scene_parts.h"
 
 namespace pmeta_nodes {
 namespace {
 
-using pmeta_msgs::RoundSummary;
-using pmeta_msgs::TaskReturn;
 using pmeta_msgs::Trajectory;
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 
-// scene bands, from the top: title, grids, legend
-constexpr double kTitleHeight = 1.05;
-constexpr double kLegendHeight = 0.55;
+// grids stand between title and legend
 constexpr double kColumnGap = 0.1;        // in sides of a grid
 constexpr double kLabelBand = 0.15;       // above and below each grid, in sides of a grid
 constexpr double kLeastLabelBand = 0.22;  // so that labels of many small grids can be read
@@ -34,19 +30,9 @@ constexpr double kCellLayer = 0.0;
 constexpr double kArrowLayer = 0.1;
 constexpr double kPathLayer = 0.2;
 constexpr double kHeadLayer = 0.25;
-constexpr double kSymbolLayer = 0.3;
-constexpr double kTextLayer = 0.5;
 
-const Color kWhite = rgb(0xffffff);
-const Color kInk = rgb(0x222222);
-const Color kFaint = rgb(0x777777);
 const Color kLine = rgb(0xffffff);
 const Color kUnknown = rgb(0xd9d9d9);
-const Color kGold = rgb(0xffb000);
-const Color kPersonal = rgb(0xd81b60);
-const Color kMeta = rgb(0x0b4fb3);
-
-Color policyColor(int policy) { return policy == Trajectory::META ? kMeta : kPersonal; }
 
 /// Columns and rows of tasks that make the grids as large as possible.
 struct Layout {
@@ -74,13 +60,6 @@ Layout layoutGrids(int num_tasks) {
     if (layout.side > best.side) best = layout;
   }
   return best;
-}
-
-std::string number(double value) {
-  if (!std::isfinite(value)) return "-";
-  char text[32];
-  std::snprintf(text, sizeof text, std::abs(value) < 1e5 ? "%.2f" : "%.3g", value);
-  return text;
 }
 
 struct Cell {
@@ -295,19 +274,6 @@ void drawLabels(const GridPicture& picture, const std::string& below, MarkerArra
                                      width, kInk));
 }
 
-std::string resultText(const PolicyView& view, const SceneContent& content, bool is_meta) {
-  if (is_meta && !content.has_meta) return "no meta-policy here";
-  if (view.result) {
-    return "round " + std::to_string(view.result->round) + ", return " +
-           number(view.result->return_mean);
-  }
-  if (view.episode) {
-    return "round " + std::to_string(view.episode->round) + ", episode " +
-           number(view.episode->episode_return);
-  }
-  return "no round yet";
-}
-
 void drawTask(const GridGeometry& grid, int task, const Layout& layout, const SceneContent& content,
               MarkerArray& scene) {
   const TaskView& views = content.tasks.at(task);
@@ -318,7 +284,7 @@ void drawTask(const GridGeometry& grid, int task, const Layout& layout, const Sc
   for (const int policy : {Trajectory::PERSONAL, Trajectory::META}) {
     const bool is_meta = policy == Trajectory::META;
     const PolicyView& view = is_meta ? views.meta : views.personal;
-    const GridPicture picture{grid,  view, policy, gridFrame(task, policy), 2 * task + is_meta,
+    const GridPicture picture{grid,  view, policy, policyFrame(task, policy), 2 * task + is_meta,
                               layout};
     scene.markers.push_back(drawCells(picture, range));
     scene.markers.push_back(drawArrows(picture, range));
@@ -329,44 +295,8 @@ void drawTask(const GridGeometry& grid, int task, const Layout& layout, const Sc
   }
 }
 
-std::string stateText(const RoundSummary& summary) {
-  switch (summary.state) {
-    case RoundSummary::LATE:
-      return " (waiting for late agents)";
-    case RoundSummary::FINISHED:
-      return " (finished)";
-    case RoundSummary::STOPPED:
-      return " (stopped)";
-    default:
-      return "";
-  }
-}
-
-void drawTitle(const SceneContent& content, MarkerArray& scene) {
-  std::string title = content.experiment + ": ";
-  std::string personal;
-  std::string meta;
-  if (content.summary) {
-    title += "round " + std::to_string(content.summary->round) + " of " +
-             std::to_string(content.summary->rounds) + stateText(*content.summary);
-    personal = "mean personal return (PP) " + number(content.summary->personal_return);
-    if (content.has_meta) meta = "mean meta return (MP) " + number(content.summary->meta_return);
-  } else {
-    title += "waiting for round 1 of " + std::to_string(content.rounds);
-  }
-  if (!content.has_trajectories) title += " - trajectories are switched off";
-
-  const double top = kSceneHeight / 2;
-  scene.markers.push_back(
-      textMarker(kWorldFrame, "title", 0, {0, top - 0.3}, kTextLayer, title, 0.3, 11.5, kInk));
-  scene.markers.push_back(textMarker(kWorldFrame, "title", 1, {-2.2, top - 0.72}, kTextLayer,
-                                     personal, 0.23, 4.2, kPersonal));
-  scene.markers.push_back(
-      textMarker(kWorldFrame, "title", 2, {2.2, top - 0.72}, kTextLayer, meta, 0.23, 4.2, kMeta));
-}
-
 /// What the symbols mean, along the lower edge.
-void drawLegend(MarkerArray& scene) {
+void drawSymbols(MarkerArray& scene) {
   const double y = -kSceneHeight / 2 + kLegendHeight / 2;
   const double r = 0.11;
   Figure figure(kWorldFrame, "legend", 0, kSymbolLayer);
@@ -395,10 +325,6 @@ void drawLegend(MarkerArray& scene) {
 
 }  // namespace
 
-std::string gridFrame(int task, int policy) {
-  return "task_" + std::to_string(task) + (policy == Trajectory::META ? "/meta" : "/personal");
-}
-
 double gridSide(int num_tasks) { return layoutGrids(num_tasks).side; }
 
 std::vector<geometry_msgs::TransformStamped> gridFrames(int num_tasks) {
@@ -412,7 +338,7 @@ std::vector<geometry_msgs::TransformStamped> gridFrames(int num_tasks) {
       const int slot = 2 * row + (policy == Trajectory::META);
       geometry_msgs::TransformStamped frame;
       frame.header.frame_id = kWorldFrame;
-      frame.child_frame_id = gridFrame(task, policy);
+      frame.child_frame_id = policyFrame(task, policy);
       frame.transform.translation.x = middle - layout.side / 2;
       frame.transform.translation.y =
           kSceneHeight / 2 - kTitleHeight - (slot + 0.5) * layout.slot_height + layout.side / 2;
@@ -475,8 +401,26 @@ MarkerArray gridworldScene(const std::vector<GridGeometry>& grids, const SceneCo
     drawTask(grids[task], static_cast<int>(task), layout, content, scene);
   }
   drawTitle(content, scene);
-  drawLegend(scene);
+  drawSymbols(scene);
   return scene;
+}
+
+GridworldScene::GridworldScene(const pmeta::GridworldFamily& family) {
+  for (int task = 0; task < family.numTasks(); ++task) {
+    grids_.push_back({family.task(task), family.stride(), family.taskName(task)});
+  }
+}
+
+std::vector<geometry_msgs::TransformStamped> GridworldScene::frames() const {
+  return gridFrames(static_cast<int>(grids_.size()));
+}
+
+std::string GridworldScene::problem(const Trajectory& trajectory) const {
+  return trajectoryProblem(trajectory, grids_.at(trajectory.task));
+}
+
+MarkerArray GridworldScene::still(const SceneContent& content) const {
+  return gridworldScene(grids_, content);
 }
 
 }  // namespace pmeta_nodes

@@ -98,7 +98,7 @@ std::string agentsLaunch(const Experiment& experiment, bool record) {
   if (record) {
     const std::string bag = experiment.runDir() + ".bag";
     xml << "  <node name=\"recorder\" pkg=\"rosbag\" type=\"record\" args=\"-O '" << escapeXml(bag)
-        << "' -e '/pmeta/.*'\"/>\n";
+        << "' -e '/pmeta/.*' -x /pmeta/playback\"/>\n";
   }
   xml << "</launch>\n";
   return xml.str();

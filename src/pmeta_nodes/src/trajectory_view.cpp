@@ -1,5 +1,7 @@
 #include "trajectory_view.h"
 
+#include <algorithm>
+
 namespace pmeta_nodes {
 namespace {
 
@@ -9,41 +11,57 @@ using pmeta_msgs::Trajectory;
 
 constexpr double kWarnPeriod = 10;  // seconds
 constexpr int kPolicies = 2;
+constexpr double kLongestPlayStep = 0.5;  // s: a machine that hangs does not skip episodes
 
-double redrawRate(const ros::NodeHandle& private_nh) {
-  constexpr double kDefault = 10;
-  constexpr double kHighest = 60;
-  const double rate = private_nh.param("redraw_rate", kDefault);
-  if (rate > 0 && rate <= kHighest) return rate;
-  ROS_WARN("redraw_rate is %g; it must lie in (0, %g] per second. Using %g.", rate, kHighest,
-           kDefault);
-  return kDefault;
+/// A private parameter in (0, highest].
+double positiveParam(const ros::NodeHandle& private_nh, const std::string& name,
+                     double default_value, double highest) {
+  const double value = private_nh.param(name, default_value);
+  if (value > 0 && value <= highest) return value;
+  ROS_WARN("%s is %g; it must lie in (0, %g]. Using %g.", name.c_str(), value, highest,
+           default_value);
+  return default_value;
 }
 
 }  // namespace
 
 TrajectoryView::TrajectoryView(ros::NodeHandle nh, ros::NodeHandle private_nh,
-                               const pmeta::Experiment& experiment) {
+                               const pmeta::Experiment& experiment)
+    : scene_(makeScene(experiment)) {
   const pmeta::ExperimentSettings& settings = experiment.settings();
-  const auto* family = dynamic_cast<const pmeta::GridworldFamily*>(&experiment.family());
-  if (family == nullptr) {
-    ROS_WARN("The viewer has no scene for environment '%s', only for gridworld: rviz stays empty.",
+  if (scene_ == nullptr) {
+    ROS_WARN("The viewer has no scene for environment '%s': rviz stays empty.",
              settings.environment.c_str());
     return;
   }
 
-  const int num_tasks = family->numTasks();
-  for (int task = 0; task < num_tasks; ++task) {
-    grids_.push_back({family->task(task), family->stride(), family->taskName(task)});
-  }
+  const int num_tasks = experiment.totalTasks();
   content_.experiment = settings.experiment;
   content_.rounds = settings.rounds;
   content_.has_trajectories = settings.publish_trajectories;
   content_.has_meta = experiment.evaluatesMeta();
   content_.tasks.resize(num_tasks);
+  playbacks_.assign(num_tasks, Playback(scene_->stepSeconds()));
 
-  frames_.sendTransform(gridFrames(num_tasks));
+  frames_.sendTransform(scene_->frames());
   markers_ = nh.advertise<visualization_msgs::MarkerArray>("markers", 1, true);
+  subscribe(nh, settings, num_tasks);
+  constexpr double kHighestRate = 60;
+  redraw_timer_ = nh.createWallTimer(
+      ros::WallDuration(1 / positiveParam(private_nh, "redraw_rate", 10, kHighestRate)),
+      &TrajectoryView::redraw, this);
+  if (scene_->stepSeconds() == 0) return;
+
+  moving_markers_ = nh.advertise<visualization_msgs::MarkerArray>("playback", 1, true);
+  speed_ = positiveParam(private_nh, "speed", 1, 100);
+  last_play_ = ros::WallTime::now();
+  play_timer_ = nh.createWallTimer(
+      ros::WallDuration(1 / positiveParam(private_nh, "frame_rate", 20, kHighestRate)),
+      &TrajectoryView::play, this);
+}
+
+void TrajectoryView::subscribe(ros::NodeHandle& nh, const pmeta::ExperimentSettings& settings,
+                               int num_tasks) {
   // queues hold one round's messages of both policies; older ones may be dropped
   for (int task = 0; task < num_tasks && settings.publish_trajectories; ++task) {
     subscribers_.push_back(nh.subscribe("task_" + std::to_string(task) + "/trajectory",
@@ -52,35 +70,39 @@ TrajectoryView::TrajectoryView(ros::NodeHandle nh, ros::NodeHandle private_nh,
   subscribers_.push_back(
       nh.subscribe("returns", 2 * kPolicies * num_tasks, &TrajectoryView::onReturn, this));
   subscribers_.push_back(nh.subscribe("round", 1, &TrajectoryView::onRound, this));
-  timer_ = nh.createWallTimer(ros::WallDuration(1 / redrawRate(private_nh)),
-                              &TrajectoryView::redraw, this);
 }
 
 void TrajectoryView::onTrajectory(const Trajectory::ConstPtr& trajectory) {
-  if (trajectory->task >= grids_.size()) {
+  if (trajectory->task >= content_.tasks.size()) {
     ROS_WARN_THROTTLE(kWarnPeriod, "Ignored a trajectory of task %u: there are tasks 0 to %zu.",
-                      trajectory->task, grids_.size() - 1);
+                      trajectory->task, content_.tasks.size() - 1);
     return;
   }
-  const std::string problem = trajectoryProblem(*trajectory, grids_[trajectory->task]);
+  const std::string problem = scene_->problem(*trajectory);
   if (!problem.empty()) {
     ROS_WARN_THROTTLE(kWarnPeriod, "Ignored a trajectory of task %u: %s", trajectory->task,
                       problem.c_str());
     return;
   }
-  view(trajectory->task, trajectory->policy == Trajectory::META).episode = trajectory;
-  changed_ = true;
+  if (playbacks_[trajectory->task].offer(trajectory)) takeShown(trajectory->task);
 }
 
 void TrajectoryView::onReturn(const TaskReturn::ConstPtr& result) {
   const bool is_meta = result->policy == TaskReturn::META;
-  if (result->task >= grids_.size() || (!is_meta && result->policy != TaskReturn::PERSONAL)) {
+  if (result->task >= content_.tasks.size() ||
+      (!is_meta && result->policy != TaskReturn::PERSONAL)) {
     ROS_WARN_THROTTLE(kWarnPeriod, "Ignored a return of task %u, policy %u.", result->task,
                       result->policy);
     return;
   }
-  if (result->split == TaskReturn::TEST) return;
-  view(result->task, is_meta).result = result;
+  TaskView& task = content_.tasks[result->task];
+  TaskReturn::ConstPtr& kept = is_meta ? task.meta.result : task.personal.result;
+  // of a meta-policy's returns in a round, the one after most exploration counts
+  if (kept && kept->run_id == result->run_id && kept->round == result->round &&
+      kept->context_episodes > result->context_episodes) {
+    return;
+  }
+  kept = result;
   changed_ = true;
 }
 
@@ -95,17 +117,34 @@ void TrajectoryView::onRound(const RoundSummary::ConstPtr& summary) {
 void TrajectoryView::redraw(const ros::WallTimerEvent&) {
   if (!changed_) return;
   changed_ = false;
-  markers_.publish(gridworldScene(grids_, content_));
+  markers_.publish(scene_->still(content_));
 }
 
-PolicyView& TrajectoryView::view(int task, bool is_meta) {
-  return is_meta ? content_.tasks[task].meta : content_.tasks[task].personal;
+void TrajectoryView::play(const ros::WallTimerEvent&) {
+  const ros::WallTime now = ros::WallTime::now();
+  const double passed = std::min((now - last_play_).toSec(), kLongestPlayStep);
+  last_play_ = now;
+  std::vector<double> seconds;
+  for (std::size_t task = 0; task < playbacks_.size(); ++task) {
+    if (playbacks_[task].advance(speed_ * passed)) takeShown(task);
+    seconds.push_back(playbacks_[task].seconds());
+  }
+  if (moving_markers_.getNumSubscribers() == 0) return;
+  moving_markers_.publish(scene_->moving(content_, seconds));
+}
+
+/// Brings the content up to the task's playback.
+void TrajectoryView::takeShown(std::size_t task) {
+  content_.tasks[task].personal.episode = playbacks_[task].personal();
+  content_.tasks[task].meta.episode = playbacks_[task].meta();
+  changed_ = true;
 }
 
 void TrajectoryView::forgetOtherRuns(const std::string& run_id) {
-  for (TaskView& task : content_.tasks) {
-    for (PolicyView* view : {&task.personal, &task.meta}) {
-      if (view->episode && view->episode->run_id != run_id) view->episode.reset();
+  for (std::size_t task = 0; task < content_.tasks.size(); ++task) {
+    playbacks_[task].forgetOtherRuns(run_id);
+    takeShown(task);
+    for (PolicyView* view : {&content_.tasks[task].personal, &content_.tasks[task].meta}) {
       if (view->result && view->result->run_id != run_id) view->result.reset();
     }
   }

@@ -31,6 +31,15 @@ TEST(HalfCheetah, SaysWhatAnAgentMustKnow) {
   EXPECT_EQ(HalfCheetah({Goal::kDirection, 1}, model(), 64).spec().horizon, 64);
 }
 
+TEST(HalfCheetah, ItsConfigurationIsTheBeginningOfItsState) {
+  HalfCheetah env({Goal::kDirection, 1}, model());
+  Driven driven(env);
+  driven.reset();
+  driven.randomStep();
+  const std::vector<double> state = env.state();
+  EXPECT_EQ(env.configuration(), std::vector<double>(state.begin(), state.begin() + 9));
+}
+
 TEST(HalfCheetah, RewardsVelocityOrBeingNearOne) {
   EXPECT_EQ(HalfCheetah::reward({Goal::kDirection, 1}, 2, 0.1), 1.9);
   EXPECT_EQ(HalfCheetah::reward({Goal::kDirection, -1}, 2, 0.1), -2.1);

@@ -29,6 +29,7 @@ class Counter : public Env {
     observe(observation);
     return {value_, value_ > 10, steps_ == spec_.horizon};
   }
+  std::vector<double> configuration() const override { return {value_, 7, value_}; }
 
  private:
   void observe(double* observation) const {
@@ -83,7 +84,10 @@ TEST(Evaluation, CountsTheSparseRewardWhereThereIsOne) {
   Rng rng(1, 0, Stream::kEvaluate);
   const auto still = [](const float*, int, double* actions) { actions[0] = 0; };
   EXPECT_EQ(evaluation.run(still, rng).mean, 3);
-  EXPECT_EQ(evaluation.record(still, rng).rewards, std::vector<double>{3});
+  const Episode episode = evaluation.record(still, rng);
+  EXPECT_EQ(episode.rewards, std::vector<double>{3});
+  EXPECT_EQ(episode.position_size, 0) << "where the observation says all";
+  EXPECT_TRUE(episode.positions.empty());
 }
 
 TEST(Evaluation, IsTheMeanOverEpisodesRunOneByOne) {
@@ -127,12 +131,17 @@ TEST(Evaluation, RecordsTheFirstEpisode) {
     EXPECT_EQ(e.action_size, 1);
     ASSERT_EQ(e.observations.size(), 2 * (e.rewards.size() + 1));
     ASSERT_EQ(e.actions.size(), e.rewards.size());
+    EXPECT_EQ(e.position_size, 3);
+    ASSERT_EQ(e.positions.size(), 3 * (e.rewards.size() + 1));
     EXPECT_EQ(e.observations[0], value);
+    EXPECT_EQ(e.positions[2], value);
     double sum = 0;
     for (std::size_t t = 0; t < e.rewards.size(); ++t) {
       EXPECT_EQ(e.actions[t], actionAt(static_cast<float>(value)));
       value += e.actions[t];
       EXPECT_EQ(e.observations[2 * t + 2], value);
+      EXPECT_EQ(e.positions[3 * t + 3], value);
+      EXPECT_EQ(e.positions[3 * t + 4], 7);
       sum += e.rewards[t];
     }
     EXPECT_TRUE(e.terminated);

@@ -40,6 +40,10 @@ void MujocoEnv::setState(const std::vector<double>& state) {
   steps_ = static_cast<int>(state.back());
 }
 
+std::vector<double> MujocoEnv::configuration() const {
+  return {simulation_.qpos(), simulation_.qpos() + simulation_.nq()};
+}
+
 double MujocoEnv::squaredControl() const {
   double sum = 0;
   const double* control = simulation_.control();

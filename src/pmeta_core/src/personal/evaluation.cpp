@@ -53,13 +53,16 @@ Episode Evaluation::record(const BatchPolicy& policy, Rng& rng) {
   Episode episode;
   episode.observation_size = static_cast<int>(observation_size_);
   episode.action_size = static_cast<int>(action_size_);
+  Env& env = *envs_.front();
   const auto keep = [&] {
     episode.observations.insert(episode.observations.end(), observation_.begin(),
                                 observation_.end());
     std::copy(observation_.begin(), observation_.end(), observations_.begin());
+    const std::vector<double> configuration = env.configuration();
+    episode.position_size = static_cast<int>(configuration.size());
+    episode.positions.insert(episode.positions.end(), configuration.begin(), configuration.end());
   };
 
-  Env& env = *envs_.front();
   env.reset(rng, observation_.data());
   keep();
   while (!episode.terminated && !episode.truncated) {

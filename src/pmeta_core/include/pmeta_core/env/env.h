@@ -49,6 +49,9 @@ class Env {
   /// is the count of steps since the reset. Throws Error where an environment does not offer it.
   virtual std::vector<double> state() const;
 
+  /// Generalised positions of the mechanism, for drawings; empty where the observation says all.
+  virtual std::vector<double> configuration() const { return {}; }
+
   /// Goes on from a state() of the same task. Throws Error if `state` cannot be one.
   virtual void setState(const std::vector<double>& state);
 };

@@ -56,6 +56,7 @@ class MountainCarFamily : public EnvFamily {
   std::unique_ptr<Env> make(int task) const override;
 
   const MountainCarTask& task(int task) const { return tasks_.at(task); }
+  double velocityScale() const { return velocity_scale_; }  ///< of observations
 
  private:
   std::vector<double> zeta_ = {3, 3.5, 4, 4.5, 5};

@@ -21,6 +21,7 @@ class MujocoEnv : public Env {
   /// it, see MujocoSimulation::bodyPosition), steps.
   std::vector<double> state() const final;
   void setState(const std::vector<double>& state) final;
+  std::vector<double> configuration() const final;  ///< qpos, as in the model
 
   const MujocoSimulation& simulation() const { return simulation_; }
 

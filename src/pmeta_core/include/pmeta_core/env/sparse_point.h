@@ -55,6 +55,7 @@ class SparsePointFamily : public EnvFamily {
   std::unique_ptr<Env> make(int task) const override;
 
   const SparsePointTask& task(int task) const { return tasks_.at(task).goal; }
+  double goalRadius() const { return goal_radius_; }
 
  private:
   struct Task {

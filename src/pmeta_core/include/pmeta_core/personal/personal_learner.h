@@ -17,6 +17,8 @@ struct Episode {
   std::vector<double> observations;  ///< (steps + 1) x observation_size, row-major
   std::vector<double> actions;       ///< steps x action_size, row-major
   std::vector<double> rewards;       ///< steps
+  int position_size = 0;
+  std::vector<double> positions;  ///< (steps + 1) x position_size, see Env::configuration()
   bool terminated = false;
   bool truncated = false;
   std::vector<double> state_values;  ///< tabular tasks: max_a Q(s,a) by state, NaN where not owned

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/env/mujoco_model.h"
+
+struct mjData_;
+
+namespace pmeta {
+
+/// What one geom of a body looks like.
+struct GeomShape {
+  enum class Type {
+    kSphere,     ///< size: radius
+    kCapsule,    ///< size: radius, half length of the cylinder, along z
+    kEllipsoid,  ///< size: half axes
+    kCylinder,   ///< size: radius, half length, along z
+    kBox,        ///< size: half sides
+  };
+  Type type = Type::kSphere;
+  std::string name;              ///< "" if it has none
+  std::array<double, 3> size{};  ///< m
+  std::array<double, 3> rgb{};   ///< of its material, or its own; 0 to 1
+};
+
+/// Where the geoms of a model's bodies are in a given configuration: forward kinematics, no
+/// dynamics. For drawings.
+class MujocoKinematics {
+ public:
+  /// Keeps a copy of `model`. Throws Error where a body has a geom of a type GeomShape does not
+  /// know, e.g. a mesh. Geoms of the world, such as the floor, are left out.
+  explicit MujocoKinematics(const MujocoModel& model);
+
+  const std::vector<GeomShape>& shapes() const { return shapes_; }
+  int nq() const;  ///< numbers in a configuration
+
+  /// The configuration that the model rests in, nq().
+  std::vector<double> restConfiguration() const;
+
+  /// Takes up a configuration of nq() numbers; quaternions need not be normalised.
+  void pose(const double* qpos);
+
+  /// Centre (m) of shape `index` and its orientation (3 x 3, row-major), world axes, in the last
+  /// pose().
+  const double* position(std::size_t index) const;
+  const double* rotation(std::size_t index) const;
+
+  /// Origin (m) of a body's frame, world axes, in the last pose(); see MujocoModel::body().
+  const double* bodyPosition(int body) const;
+
+ private:
+  struct Delete {
+    void operator()(mjData_* data) const;
+  };
+  MujocoModel model_;
+  std::unique_ptr<mjData_, Delete> data_;
+  std::vector<GeomShape> shapes_;
+  std::vector<std::size_t> geoms_;  // of each shape, its index in the model
+};
+
+}  // namespace pmeta

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "scene_parts.h"
+
+namespace pmeta_nodes {
+
+/// Cards for all tasks, side by side between a scene's title and legend: each has a header with the
+/// task's name, and below it one lane for both policies, or a lane for each.
+///
+/// A card's frame "task_<i>" has its origin in the middle of the card.
+struct Cards {
+  int num_tasks = 0;
+  int num_train = 0;  ///< tasks from there on are test tasks, which have no personal policy
+  int columns = 1;
+  int lanes = 2;        ///< on a card: 1 or 2
+  bool beside = false;  ///< are two lanes side by side, personal on the left? Else it is above
+  double slot_width = 0;
+  double slot_height = 0;  ///< of a card with the gap around it
+  double letter = 0;       ///< height of letters
+  double lane_width = 0;
+  double lane_height = 0;  ///< without its label
+  double scale = 0;        ///< units of the scene for a unit of the lane's content
+
+  bool isTest(int task) const { return task >= num_train; }
+  double width() const;
+  double height() const;
+
+  /// The middle of a lane's lower edge on its card.
+  Point laneBottom(int task, int policy) const;
+};
+
+/// The arrangement in which content of that size is drawn largest in every lane.
+Cards layoutCards(int num_tasks, int num_train, int lanes, double content_width,
+                  double content_height);
+
+/// "task_<i>"
+std::string taskFrame(int task);
+
+/// Frames "task_<i>" in the world frame.
+std::vector<geometry_msgs::TransformStamped> cardFrames(const Cards& cards);
+
+/// The policies whose lanes a card has: a test task has only meta's.
+std::vector<int> policiesOf(const Cards& cards, int task);
+
+/// Grounds, names and descriptions of all tasks, and what is known of each policy (namespaces
+/// "cards", "names", "descriptions", "results").
+void drawCards(const Cards& cards, const pmeta::EnvFamily& family, const SceneContent& content,
+               visualization_msgs::MarkerArray& scene);
+
+/// The namespace's marker of a task and policy, or its deletion: `draw` fills it.
+template <class Draw>
+visualization_msgs::Marker policyMarker(const std::string& frame, const std::string& ns, int task,
+                                        int policy, double layer, bool shown, Draw&& draw) {
+  Figure figure(frame, ns, policyId(task, policy), layer);
+  if (shown) draw(figure);
+  return figure.take();
+}
+
+}  // namespace pmeta_nodes

@@ -1,0 +1,109 @@
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <functional>
+#include <set>
+
+#include "scene_support.h"
+
+namespace pmeta_nodes {
+namespace {
+
+using namespace test;
+
+bool waitFor(const std::function<bool()>& condition) {
+  const ros::WallTime limit = ros::WallTime::now() + ros::WallDuration(20);
+  while (!condition()) {
+    if (ros::WallTime::now() > limit) return false;
+    ros::spinOnce();
+    ros::WallDuration(0.01).sleep();
+  }
+  return true;
+}
+
+/// The cart rolls to the right by 0.01 m a step.
+Trajectory roll(int policy) {
+  std::vector<double> observations;
+  for (int i = 0; i <= 200; ++i) observations.insert(observations.end(), {0.01 * i, 0, 0, 0});
+  Trajectory message = episodeOf(1, policy, 4, observations);
+  message.run_id = "run";
+  return message;
+}
+
+/// A viewer of rviz's kind: what it has got of each topic.
+struct Watcher {
+  explicit Watcher(ros::NodeHandle& nh) {
+    using Callback = boost::function<void(const MarkerArray::ConstPtr&)>;
+    markers_sub = nh.subscribe<MarkerArray>(
+        "/pmeta/markers", 1, Callback([this](const auto& message) { markers = *message; }));
+    playback_sub = nh.subscribe<MarkerArray>(
+        "/pmeta/playback", 1, Callback([this](const auto& message) { playback = *message; }));
+  }
+  double cartX(int id) const { return find(playback, "carts", id).pose.position.x; }
+
+  MarkerArray markers;
+  MarkerArray playback;
+  ros::Subscriber markers_sub;
+  ros::Subscriber playback_sub;
+};
+
+TEST(TrajectoryViewNode, AWatcherThatComesLateSeesTheLastEpisodesMoving) {
+  ros::NodeHandle nh;
+  {
+    ros::Publisher episodes = nh.advertise<Trajectory>("/pmeta/task_1/trajectory", 4);
+    ASSERT_TRUE(waitFor([&] { return episodes.getNumSubscribers() == 1; }));
+    episodes.publish(roll(Trajectory::PERSONAL));
+    episodes.publish(roll(Trajectory::META));
+    Watcher witness(nh);
+    ASSERT_TRUE(waitFor([&] {
+      return !witness.markers.markers.empty() &&
+             find(witness.markers, "traces", 2).action == Marker::ADD &&
+             find(witness.markers, "traces", 3).action == Marker::ADD;
+    }));
+  }  // the agents have gone, and so has the first watcher
+
+  Watcher late(nh);
+  ASSERT_TRUE(
+      waitFor([&] { return !late.markers.markers.empty() && !late.playback.markers.empty(); }));
+  EXPECT_EQ(Marker::ADD, find(late.markers, "traces", 2).action);
+  EXPECT_EQ(Marker::ADD, find(late.markers, "traces", 3).action);
+  EXPECT_EQ(Marker::ADD, find(late.playback, "carts", 2).action);
+  EXPECT_EQ(Marker::DELETE, find(late.playback, "carts", 0).action);
+  const auto ids = names(late.playback);
+
+  // both carts move together, to the end and then from the start again
+  double before = late.cartX(2);
+  EXPECT_TRUE(waitFor([&] { return late.cartX(2) > before; }));
+  EXPECT_EQ(late.cartX(2), late.cartX(3));
+  EXPECT_TRUE(waitFor([&] {
+    const double last = before;
+    before = late.cartX(2);
+    return before < last;
+  }));
+  EXPECT_EQ(ids, names(late.playback));
+
+  // every frame that a marker names is there
+  std::set<std::string> frames = {kWorldFrame};
+  const boost::function<void(const tf2_msgs::TFMessage::ConstPtr&)> take =
+      [&](const auto& message) {
+        for (const auto& transform : message->transforms) frames.insert(transform.child_frame_id);
+      };
+  const ros::Subscriber tf = nh.subscribe<tf2_msgs::TFMessage>("/tf_static", 1, take);
+  ASSERT_TRUE(waitFor([&] { return frames.size() > 1; }));
+  for (const MarkerArray* array : {&late.markers, &late.playback}) {
+    for (const Marker& marker : array->markers) {
+      EXPECT_EQ(1u, frames.count(marker.header.frame_id)) << marker.header.frame_id;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace pmeta_nodes
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "trajectory_view_test");
+  const ros::NodeHandle nh;
+  return RUN_ALL_TESTS();
+}
