@@ -1,7 +1,6 @@
 #include "robot_scene.h"
 
 #include <algorithm>
-#include <set>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/env/ant.h"
@@ -11,7 +10,6 @@
 
 namespace pmeta_nodes {
 
-using pmeta::GeomShape;
 using pmeta_msgs::Trajectory;
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
@@ -20,6 +18,7 @@ namespace {
 
 constexpr double kFloorDepth = 0.3;  // m of the lane below the floor of planar robots: its scale
 constexpr double kAir = 0.35;        // m above the highest point at rest
+constexpr double kLegRoom = 0.55;    // m above the floor that is seen from above
 constexpr std::size_t kMostPathPoints = 200;
 
 constexpr double kFloorLayer = 0.1;
@@ -34,71 +33,6 @@ const Color kTarget = rgb(0xe08a00);
 
 std::string robotFrame(int task, int policy) { return policyFrame(task, policy) + "/robot"; }
 
-/// The shade of a part in its policy's colour follows how light the model's material is.
-Color shapeColor(const std::vector<GeomShape>& shapes, std::size_t index, int policy) {
-  const auto light = [](const GeomShape& shape) {
-    return 0.2126 * shape.rgb[0] + 0.7152 * shape.rgb[1] + 0.0722 * shape.rgb[2];
-  };
-  double low = light(shapes.front());
-  double high = low;
-  for (const GeomShape& shape : shapes) {
-    low = std::min(low, light(shape));
-    high = std::max(high, light(shape));
-  }
-  const double share = high > low ? (light(shapes[index]) - low) / (high - low) : 0;
-  return mix(policyColor(policy), kWhite, 0.55 * share);
-}
-
-/// The quaternion of a rotation matrix (3 x 3, row-major).
-geometry_msgs::Quaternion quaternionOf(const double* m) {
-  // from the largest of the four components, so that no division is by a small number
-  const double trace[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8],
-                           1 - m[0] - m[4] + m[8]};
-  const auto largest = std::max_element(trace, trace + 4) - trace;
-  const double whole = 0.5 * std::sqrt(trace[largest]);
-  const double part = 0.25 / whole;
-  double q[4];  // w, x, y, z
-  const double yz = (m[7] - m[5]) * part;
-  const double zx = (m[2] - m[6]) * part;
-  const double xy = (m[3] - m[1]) * part;
-  const double x_y = (m[3] + m[1]) * part;
-  const double z_x = (m[2] + m[6]) * part;
-  const double y_z = (m[7] + m[5]) * part;
-  const double rows[4][4] = {
-      {whole, yz, zx, xy}, {yz, whole, x_y, z_x}, {zx, x_y, whole, y_z}, {xy, z_x, y_z, whole}};
-  std::copy_n(rows[largest], 4, q);
-  geometry_msgs::Quaternion out;
-  out.w = q[0];
-  out.x = q[1];
-  out.y = q[2];
-  out.z = q[3];
-  return out;
-}
-
-/// How far a shape reaches above its centre; a bound for cylinders and ellipsoids.
-double reachUp(const GeomShape& shape, const double* rotation) {
-  const auto& size = shape.size;
-  const double axis = std::abs(rotation[8]);
-  switch (shape.type) {
-    case GeomShape::Type::kCapsule:
-    case GeomShape::Type::kCylinder:
-      return axis * size[1] + size[0];
-    case GeomShape::Type::kBox:
-    case GeomShape::Type::kEllipsoid:
-      return std::abs(rotation[6]) * size[0] + std::abs(rotation[7]) * size[1] + axis * size[2];
-    default:
-      return size[0];
-  }
-}
-
-geometry_msgs::Point pointOf(double x, double y, double z) {
-  geometry_msgs::Point point;
-  point.x = x;
-  point.y = y;
-  point.z = z;
-  return point;
-}
-
 }  // namespace
 
 RobotScene::RobotScene(const pmeta::EnvFamily& family, std::vector<RobotTarget> targets,
@@ -111,13 +45,9 @@ RobotScene::RobotScene(const pmeta::EnvFamily& family, std::vector<RobotTarget> 
   kinematics_ = std::make_unique<pmeta::MujocoKinematics>(model);
   step_seconds_ = robot->simulation().dt();
   torso_ = model.body("torso");
-  for (std::size_t i = 0; i < kinematics_->shapes().size(); ++i) {
-    const double top =
-        kinematics_->position(i)[2] + reachUp(kinematics_->shapes()[i], kinematics_->rotation(i));
-    rest_height_ = std::max(rest_height_, top);
-  }
+  rest_height_ = topOf(*kinematics_);
   const double height = isPlanar() ? kFloorDepth + rest_height_ + kAir
-                                   : camera_.view_depth * std::sin(camera_.elevation) + kAir;
+                                   : camera_.view_depth * std::sin(camera_.elevation) + kLegRoom;
   cards_ = layoutCards(static_cast<int>(targets_.size()), family.numTasks(), 2, camera_.view_width,
                        height);
 }
@@ -157,8 +87,8 @@ std::string RobotScene::problem(const Trajectory& trajectory) const {
 
 double RobotScene::halfWidth() const { return cards_.lane_width / 2 / scale(); }
 
-const std::vector<RobotScene::Position>& RobotScene::pathOf(int task, int policy,
-                                                            const Trajectory::ConstPtr& episode) {
+const std::vector<Position>& RobotScene::pathOf(int task, int policy,
+                                                const Trajectory::ConstPtr& episode) {
   Path& path = paths_[{task, policy}];
   if (path.episode == episode) return path.torso;
   path.episode = episode;
@@ -231,7 +161,10 @@ MarkerArray RobotScene::moving(const SceneContent& content, const std::vector<do
       if (moment.episode) moment.step = stepAt(*moment.episode, seconds.at(task), step_seconds_);
       drawFloor(moment, scene);
       scene.markers.push_back(drawPath(moment));
-      drawRobot(moment, scene);
+      if (moment.episode) {
+        kinematics_->pose(&moment.episode->positions[moment.step * moment.episode->position_size]);
+      }
+      drawGeoms(*kinematics_, pictureOf(moment), scene);
       const double y = isPlanar() ? -0.68 * kFloorDepth : -0.5 * camera_.view_depth;
       const double up = isPlanar() ? 1 : std::sin(camera_.elevation);
       scene.markers.push_back(textMarker(moment.lane_frame, "steps", policyId(task, policy),
@@ -243,91 +176,15 @@ MarkerArray RobotScene::moving(const SceneContent& content, const std::vector<do
   return scene;
 }
 
-void RobotScene::drawRobot(const Moment& moment, MarkerArray& scene) {
-  Position origin;
-  if (moment.episode) {
-    kinematics_->pose(&moment.episode->positions[moment.step * moment.episode->position_size]);
-    origin = (*moment.torso)[moment.step];
-  }
-  std::set<double> radii;
-  const std::vector<GeomShape>& shapes = kinematics_->shapes();
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
-    scene.markers.push_back(drawShape(moment, i, origin));
-    if (shapes[i].type == GeomShape::Type::kCapsule && radii.insert(shapes[i].size[0]).second) {
-      scene.markers.push_back(drawCaps(moment, i, origin));
-    }
-  }
-}
-
-/// One geom; of a capsule, its cylinder. The model's world moves along below the torso.
-Marker RobotScene::drawShape(const Moment& moment, std::size_t index,
-                             const Position& origin) const {
-  const std::vector<GeomShape>& shapes = kinematics_->shapes();
-  const GeomShape& shape = shapes[index];
-  Marker marker =
-      makeMarker(moment.robot_frame, "geoms",
-                 policyId(moment.task, moment.policy) * static_cast<int>(shapes.size()) +
-                     static_cast<int>(index));
-  if (!moment.episode) {
-    marker.action = Marker::DELETE;
-    return marker;
-  }
-  marker.color = shapeColor(shapes, index, moment.policy);
-  const double* at = kinematics_->position(index);
-  const double s = scale();
-  marker.pose.position = pointOf((at[0] - origin.x) * s, (at[1] - origin.y) * s, at[2] * s);
-  marker.pose.orientation = quaternionOf(kinematics_->rotation(index));
-  const auto resize = [&](int type, double x, double y, double z) {
-    marker.type = type;
-    marker.scale.x = 2 * x * s;
-    marker.scale.y = 2 * y * s;
-    marker.scale.z = 2 * z * s;
-  };
-  const auto& size = shape.size;
-  switch (shape.type) {
-    case GeomShape::Type::kSphere:
-      resize(Marker::SPHERE, size[0], size[0], size[0]);
-      break;
-    case GeomShape::Type::kEllipsoid:
-      resize(Marker::SPHERE, size[0], size[1], size[2]);
-      break;
-    case GeomShape::Type::kCapsule:
-    case GeomShape::Type::kCylinder:
-      resize(Marker::CYLINDER, size[0], size[0], size[1]);
-      break;
-    case GeomShape::Type::kBox:
-      resize(Marker::CUBE, size[0], size[1], size[2]);
-      break;
-  }
-  return marker;
-}
-
-/// The ends of all capsules that have the radius of shape `first`, in one marker.
-Marker RobotScene::drawCaps(const Moment& moment, std::size_t first, const Position& origin) const {
-  const std::vector<GeomShape>& shapes = kinematics_->shapes();
-  const double radius = shapes[first].size[0];
-  const double s = scale();
-  Marker marker =
-      makeMarker(moment.robot_frame, "caps",
-                 policyId(moment.task, moment.policy) * static_cast<int>(shapes.size()) +
-                     static_cast<int>(first));
-  marker.type = Marker::SPHERE_LIST;
-  marker.action = moment.episode ? Marker::ADD : Marker::DELETE;
-  marker.scale.x = marker.scale.y = marker.scale.z = 2 * radius * s;
-  marker.color = policyColor(moment.policy);
-  if (!moment.episode) return marker;
-  for (std::size_t i = first; i < shapes.size(); ++i) {
-    if (shapes[i].type != GeomShape::Type::kCapsule || shapes[i].size[0] != radius) continue;
-    const double* at = kinematics_->position(i);
-    const double* axes = kinematics_->rotation(i);
-    for (const double end : {-shapes[i].size[1], shapes[i].size[1]}) {
-      marker.points.push_back(pointOf((at[0] - origin.x + end * axes[2]) * s,
-                                      (at[1] - origin.y + end * axes[5]) * s,
-                                      (at[2] + end * axes[8]) * s));
-      marker.colors.push_back(shapeColor(shapes, i, moment.policy));
-    }
-  }
-  return marker;
+RobotPicture RobotScene::pictureOf(const Moment& moment) const {
+  RobotPicture picture;
+  picture.frame = moment.robot_frame;
+  picture.id = policyId(moment.task, moment.policy);
+  picture.color = policyColor(moment.policy);
+  picture.scale = scale();
+  picture.shown = moment.episode != nullptr;
+  if (picture.shown) picture.origin = (*moment.torso)[moment.step];
+  return picture;
 }
 
 /// Lines on the floor at every metre, which pass by as the robot moves; for planar robots ticks

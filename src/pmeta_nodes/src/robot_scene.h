@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "card.h"
-#include "pmeta_core/env/mujoco_kinematics.h"
+#include "robot_figure.h"
 
 namespace pmeta_nodes {
 
@@ -27,8 +27,8 @@ struct RobotCamera {
 /// forward kinematics of the recorded configurations, while floor and view follow the torso.
 ///
 /// "task_<i>/personal" and "task_<i>/meta" have their origins on the floor below the torso, x along
-/// the lane, y up; "…/robot" below them is the model's world, moved along with the torso, and
-/// turned so that z goes up the lane. One metre is scale() in both.
+/// the lane, y up; "task_<i>/meta/robot" and its like below them is the model's world, moved along
+/// with the torso, and turned so that z goes up the lane. One metre is scale() in both.
 class RobotScene : public Scene {
  public:
   /// `targets` has one for each task, test tasks last. Throws Error where the model has parts that
@@ -46,11 +46,6 @@ class RobotScene : public Scene {
   double scale() const { return cards_.scale; }  ///< units of the scene for 1 m
 
  private:
-  struct Position {
-    double x = 0;
-    double y = 0;
-    double z = 0;
-  };
   /// Positions of the torso in an episode, worked out once.
   struct Path {
     pmeta_msgs::Trajectory::ConstPtr episode;
@@ -71,11 +66,7 @@ class RobotScene : public Scene {
                                       const pmeta_msgs::Trajectory::ConstPtr& episode);
   bool isPlanar() const { return camera_.elevation == 0; }
   double halfWidth() const;  ///< m of floor on either side of the torso
-  void drawRobot(const Moment& moment, visualization_msgs::MarkerArray& scene);
-  visualization_msgs::Marker drawShape(const Moment& moment, std::size_t shape,
-                                       const Position& origin) const;
-  visualization_msgs::Marker drawCaps(const Moment& moment, std::size_t first,
-                                      const Position& origin) const;
+  RobotPicture pictureOf(const Moment& moment) const;
   void drawFloor(const Moment& moment, visualization_msgs::MarkerArray& scene) const;
   visualization_msgs::Marker drawPath(const Moment& moment) const;
   void drawTarget(int task, int policy, visualization_msgs::MarkerArray& scene) const;
