@@ -102,10 +102,10 @@ TEST(RunConsole, TheTableHasLastAndBestOfEveryTask) {
   console.take(roundOf(2, -1, -6));
   console.take(roundOf(3, -2, -4));
   const std::vector<std::string> expected = {
-      "task           PP last     PP best (round)    MP last     MP best (round)",
-      "0 grid_4x4       -3.00       -2.00     (2)      -5.00       -5.00     (1)",
-      "1 grid_5x5       -1.00        0.00     (2)      -3.00       -3.00     (1)",
-      "mean             -2.00       -1.00     (2)      -4.00       -4.00     (1)"};
+      "task          PP last     PP best (round)    MP last     MP best (round)",
+      "0 grid_4x4      -3.00       -2.00     (2)      -5.00       -5.00     (1)",
+      "1 grid_5x5      -1.00        0.00     (2)      -3.00       -3.00     (1)",
+      "mean            -2.00       -1.00     (2)      -4.00       -4.00     (1)"};
   EXPECT_EQ(linesOf(console.table()), expected);
 }
 
@@ -115,8 +115,8 @@ experiment: point
 rounds: 1
 updates_per_round: 1
 learner: sac
-sac: {hidden: [4], batch_size: 4, warmup_steps: 4, task_encoding: none}
-environment: {name: sparse_point_robot, goals: [0.5], test_goals: [1.0, 2.0]}
+sac: {hidden: [4], batch_size: 4, warm_up_steps: 4, task_encoding: none}
+environment: {name: sparse_point_robot, goal_angles: [0.5], test_goal_angles: [1.0, 2.0]}
 )",
                                                   "point.yaml");
   RunConsole console(experiment, true);
