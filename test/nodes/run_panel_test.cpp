@@ -229,7 +229,7 @@ TEST_F(RunPanelTest, ShowsARunWithDotsInItsNumbers) {
   EXPECT_EQ(get<QProgressBar>("progress")->value(), 12);
   EXPECT_EQ(get<QProgressBar>("progress")->text().toStdString(), "round 12 of 40");
   ASSERT_EQ(get<QTableWidget>("tasks")->rowCount(), 5);
-  const std::vector<std::string> row = {"1 grid_1", "-2.25", "-3.75", "training 25 %", "12.3k"};
+  const std::vector<std::string> row = {"grid_1", "-2.25", "-3.75", "training 25 %", "12.3k"};
   for (int column = 0; column < 5; ++column) EXPECT_EQ(cell(1, column), row[column]);
   EXPECT_TRUE(get<QTableWidget>("tasks")->isVisible());
 

@@ -21,7 +21,9 @@ std::string bestText(double best, int round) {
 }
 
 std::string bytesText(double bytes) {
-  return bytes < 999.5 ? significant(bytes, 3) + " B" : shortCount(bytes) + "B";
+  if (bytes < 999.5) return significant(bytes, 3) + " B";
+  if (bytes < 999.5e3) return significant(bytes / 1e3, 3) + " kB";
+  return significant(bytes / 1e6, 3) + " MB";
 }
 
 }  // namespace

@@ -17,7 +17,7 @@
 namespace pmeta_nodes {
 namespace {
 
-constexpr int kWidth = 340;           // px, to begin with
+constexpr int kWidth = 400;           // px, to begin with
 constexpr int kRefreshAfter = 100;    // ms
 constexpr int kClockInterval = 1000;  // ms
 
@@ -119,6 +119,7 @@ void RunPanel::build() {
   tasks_->setSelectionMode(QAbstractItemView::NoSelection);
   tasks_->setFocusPolicy(Qt::NoFocus);
   tasks_->setShowGrid(false);
+  tasks_->setWordWrap(false);
   tasks_->setAlternatingRowColors(true);
 
   pause_ = addButton("pause", "Pause");
@@ -205,8 +206,8 @@ void RunPanel::showTasks(const RunState& state) {
   if (tasks_->rowCount() != rows) tasks_->setRowCount(rows);
   int row = 0;
   for (const auto& [index, task] : state.tasks) {
-    const QString name = text(std::to_string(index) + " " + task.name);
-    setCell(tasks_, row, kTask, name, name + (task.is_test ? ", a test task" : ""));
+    const QString tip = text("task " + std::to_string(index) + ", " + task.name);
+    setCell(tasks_, row, kTask, text(task.name), tip + (task.is_test ? ", a test task" : ""));
     setCell(tasks_, row, kPersonal, number(task.personal.mean));
     setCell(tasks_, row, kMeta, number(task.meta.mean));
     setCell(tasks_, row, kAgent, text(state.agentText(task, now)),
