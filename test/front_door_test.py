@@ -319,7 +319,7 @@ def test_a_screenshot_shows_both_policies_in_rviz(tmp_path):
                   "-o", picture], timeout=300)
     assert result.returncode == 0, result.stdout + result.stderr
     pixels = (image.imread(str(picture))[:, :, :3] * 255).round().astype(int)
-    assert pixels.shape == (800, 1200, 3)
+    assert pixels.shape == (800, 1640, 3)
     # carts, labels and legend in the colours of the personal policies and the meta-policy
     for red, green, blue in ((216, 27, 96), (11, 79, 179)):
         near = abs(pixels - (red, green, blue)).max(axis=2) < 12

@@ -14,6 +14,7 @@ private parameters
   ~config_file  settings file; by default the parameter `config` of the namespace is read
 subscribes   auxiliary, returns
 publishes    meta_policy, round (both latched), /diagnostics
+offers       pause (std_srvs/SetBool): true holds the next meta-policy back, false lets the run go on
 Normally started by roslaunch pmeta_nodes gridworld.launch.
 )";
 

@@ -2,8 +2,10 @@
 
 #include <pmeta_msgs/MetaPolicy.h>
 #include <ros/callback_queue.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "conversions.h"
 #include "node_main.h"
@@ -21,11 +23,17 @@ constexpr auto kAnnounceEvery = std::chrono::seconds(5);
 // for the last messages to reach everybody before the node, and with it the launch, ends
 constexpr double kFarewell = 0.5;
 
-std::string shortNumber(double value) {
-  if (std::isnan(value)) return "-";
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f", value);
-  return text;
+constexpr char kPaused[] =
+    "paused: agents finish the round in hand, the next meta-policy waits until the service pause "
+    "is "
+    "called with false";
+
+bool isTerminal() { return isatty(STDOUT_FILENO) != 0; }
+
+// a console line of ours for each line: roslaunch mixes the nodes' output
+void logLines(const std::string& text) {
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) ROS_INFO("%s", line.c_str());
 }
 
 }  // namespace
@@ -36,6 +44,7 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
       aggregator_(experiment),
       book_(experiment),
       log_(experiment),
+      console_(experiment, isTerminal()),
       mailbox_(8 * static_cast<std::size_t>(experiment.totalTasks()) + 16) {
   summary_.run_id = experiment.settings().run_id;
   summary_.experiment = experiment.settings().experiment;
@@ -56,6 +65,7 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
       boost::function<void(const pmeta_msgs::TaskReturn::ConstPtr&)>(
           [this](const pmeta_msgs::TaskReturn::ConstPtr& msg) { mailbox_.push(msg); }),
       ros::VoidConstPtr(), hints);
+  pause_service_ = nh_.advertiseService("pause", &MetaAggregatorNode::onPause, this);
   health_ = std::make_unique<Health>(experiment.settings().experiment, "meta aggregator",
                                      [this] { return health(); });
   worker_ = std::thread([this] { work(); });
@@ -80,6 +90,18 @@ int MetaAggregatorNode::spin() {
   mailbox_.close();
   worker_.join();
   return failed_ ? 1 : 0;
+}
+
+bool MetaAggregatorNode::onPause(std_srvs::SetBool::Request& request,
+                                 std_srvs::SetBool::Response& response) {
+  response.success = !rounds_over_;
+  if (rounds_over_) {
+    response.message = "the rounds are over: there is nothing to pause";
+    return true;
+  }
+  paused_ = request.data != 0;
+  response.message = paused_ ? kPaused : "running";
+  return true;
 }
 
 void MetaAggregatorNode::work() {
@@ -111,9 +133,11 @@ void MetaAggregatorNode::runRounds() {
   while (!stop_ && book_.roundsTaken() < rounds) {
     if (const auto message = mailbox_.pop(kTick)) take(*message);
     writeCompleteRounds(false);
+    announcePause();
     closeRoundIfDue();
     announceLateness();
   }
+  rounds_over_ = true;
   const bool finished = book_.roundsTaken() == rounds;
   if (!finished) writeCompleteRounds(true);
   const pmeta::MetaPolicy& meta = aggregator_.metaPolicy();
@@ -123,7 +147,7 @@ void MetaAggregatorNode::runRounds() {
   if (finished) {
     log_.finish("finished");
     publishRound(RoundSummary::FINISHED, "all rounds are done; results in " + log_.dir());
-    ROS_INFO("finished; results in %s", log_.dir().c_str());
+    logLines(console_.table() + "finished; " + pmeta::listRunFolder(log_.dir()));
   } else {
     log_.finish("stopped");
     publishRound(RoundSummary::STOPPED, "stopped in round " + std::to_string(meta.round + 1));
@@ -181,7 +205,12 @@ void MetaAggregatorNode::closeRoundIfDue() {
   const bool complete =
       aggregator_.complete() && book_.roundsTaken() == round - 1 && book_.hasPersonal(round);
   if (!complete && !(late && aggregator_.hasQuorum())) return;
-  const double seconds = roundSeconds();
+  if (paused_) {
+    if (!held_since_) held_since_ = Clock::now();
+    return;
+  }
+  const Clock::time_point due = held_since_.value_or(Clock::now());
+  const double seconds = std::chrono::duration<double>(due - round_start_).count();
   writeCompleteRounds(true);
   const std::vector<int> missing = aggregator_.closeRound();
   if (!missing.empty()) {
@@ -205,13 +234,8 @@ void MetaAggregatorNode::writeCompleteRounds(bool force) {
     }
     publishRound(RoundSummary::RUNNING,
                  "round " + std::to_string(round.summary.round) + " is complete");
-    if (!experiment_.evaluates(round.summary.round)) continue;
-    const std::string test =
-        experiment_.numTestTasks() == 0 ? "" : "  test " + shortNumber(round.summary.test_return);
-    ROS_INFO("round %d/%d  PP %s  MP %s%s  %.2f s  ETA %.0f s", round.summary.round,
-             round.summary.rounds, shortNumber(round.summary.personal_return).c_str(),
-             shortNumber(round.summary.meta_return).c_str(), test.c_str(), round.summary.seconds,
-             round.summary.eta_seconds);
+    const std::string line = console_.take(round);
+    if (!line.empty()) ROS_INFO("%s", line.c_str());
   }
 }
 
@@ -221,14 +245,16 @@ void MetaAggregatorNode::publishMetaPolicy() {
   msg->header.stamp = ros::Time::now();
   meta_pub_.publish(boost::shared_ptr<const pmeta_msgs::MetaPolicy>(msg));
   round_start_ = Clock::now();
+  held_since_.reset();
   next_announcement_ =
       round_start_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
                          experiment_.settings().aggregation.round_timeout));
 }
 
 void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& message) {
-  summary_.state = state;
-  summary_.message = message;
+  const bool paused = pause_announced_ && state == RoundSummary::RUNNING;
+  summary_.state = paused ? static_cast<std::uint8_t>(RoundSummary::PAUSED) : state;
+  summary_.message = paused ? kPaused + (message.empty() ? "" : "; " + message) : message;
   summary_.header.stamp = ros::Time::now();
   round_pub_.publish(summary_);
 
@@ -237,7 +263,7 @@ void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& mes
   health_report_.level = state == RoundSummary::LATE      ? HealthReport::kWarn
                          : state == RoundSummary::STOPPED ? HealthReport::kError
                                                           : HealthReport::kOk;
-  health_report_.summary = message;
+  health_report_.summary = summary_.message;
   health_report_.values = {{"rounds complete", std::to_string(summary_.round)},
                            {"rounds in all", std::to_string(summary_.rounds)},
                            {"refused", std::to_string(summary_.refused)}};
@@ -251,8 +277,22 @@ void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& mes
   }
 }
 
+void MetaAggregatorNode::announcePause() {
+  // past the last aggregation only returns are out, and nothing is held back
+  const bool paused = paused_ && aggregator_.metaPolicy().round < experiment_.settings().rounds;
+  if (paused == pause_announced_) return;
+  pause_announced_ = paused;
+  publishRound(RoundSummary::RUNNING, paused ? "" : "running");
+  if (paused) {
+    ROS_INFO("%s", kPaused);
+  } else {
+    ROS_INFO("the run goes on.");
+  }
+}
+
 void MetaAggregatorNode::announceLateness() {
-  if (Clock::now() < next_announcement_) return;
+  // who is paused waits for nobody
+  if (pause_announced_ || Clock::now() < next_announcement_) return;
   next_announcement_ = Clock::now() + kAnnounceEvery;
   // an update may be in and only a return missing
   const std::vector<int> missing = aggregator_.complete() ? book_.awaited() : aggregator_.missing();

@@ -4,10 +4,12 @@
 #include <pmeta_msgs/RoundSummary.h>
 #include <pmeta_msgs/TaskReturn.h>
 #include <ros/ros.h>
+#include <std_srvs/SetBool.h>
 
 #include <atomic>
 #include <chrono>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <variant>
@@ -15,6 +17,7 @@
 
 #include "health.h"
 #include "mailbox.h"
+#include "pmeta_core/run/console.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/meta_aggregator.h"
 #include "pmeta_core/run/run_log.h"
@@ -26,6 +29,9 @@ namespace pmeta_nodes {
 /// Subscribes to auxiliary and returns; publishes meta_policy and round (both latched), and writes
 /// the run folder. A round is closed once every task's update and return are in, or, after
 /// round_timeout, once a quorum of updates is; while someone is missing `round` names who.
+///
+/// The service `pause` (true) holds the next meta-policy back, so that agents wait once the round
+/// in hand is done; `pause` (false) lets the run go on. Only time passes: the result is the same.
 class MetaAggregatorNode {
  public:
   /// Creates the run folder; throws pmeta::Error if that cannot be.
@@ -41,6 +47,7 @@ class MetaAggregatorNode {
   using Message =
       std::variant<pmeta_msgs::AuxiliaryUpdate::ConstPtr, pmeta_msgs::TaskReturn::ConstPtr>;
 
+  bool onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   void work();
   void runRounds();
   void take(const Message& message);
@@ -50,6 +57,7 @@ class MetaAggregatorNode {
   void closeRoundIfDue();
   void writeCompleteRounds(bool force);
   void publishMetaPolicy();
+  void announcePause();
   void publishRound(std::uint8_t state, const std::string& message);
   void announceLateness();
   std::string taskNames(const std::vector<int>& tasks) const;
@@ -61,8 +69,11 @@ class MetaAggregatorNode {
   pmeta::MetaAggregator aggregator_;  ///< the worker's, as are book_ and log_
   pmeta::RoundBook book_;
   pmeta::RunLog log_;
+  pmeta::RunConsole console_;
   Clock::time_point round_start_;
   Clock::time_point next_announcement_;
+  std::optional<Clock::time_point> held_since_;  ///< the round is due, but the run is paused
+  bool pause_announced_ = false;
   pmeta_msgs::RoundSummary summary_;  ///< of the last complete round
 
   ros::NodeHandle nh_;
@@ -70,9 +81,12 @@ class MetaAggregatorNode {
   ros::Publisher round_pub_;
   ros::Subscriber auxiliary_sub_;
   ros::Subscriber returns_sub_;
+  ros::ServiceServer pause_service_;
   Mailbox<Message> mailbox_;
 
   std::atomic<bool> stop_{false};
+  std::atomic<bool> paused_{false};
+  std::atomic<bool> rounds_over_{false};  ///< nothing is left to pause
   std::atomic<bool> done_{false};
   std::atomic<bool> failed_{false};
   std::mutex health_mutex_;

@@ -1,6 +1,6 @@
 #include "scene_parts.h"
 
-#include <cstdio>
+#include "pmeta_core/base/format.h"
 
 namespace pmeta_nodes {
 
@@ -14,6 +14,8 @@ std::string stateText(const RoundSummary& summary) {
   switch (summary.state) {
     case RoundSummary::LATE:
       return " (waiting for late agents)";
+    case RoundSummary::PAUSED:
+      return " (paused)";
     case RoundSummary::FINISHED:
       return " (finished)";
     case RoundSummary::STOPPED:
@@ -27,12 +29,7 @@ std::string stateText(const RoundSummary& summary) {
 
 Color policyColor(int policy) { return policy == Trajectory::META ? kMeta : kPersonal; }
 
-std::string number(double value) {
-  if (!std::isfinite(value)) return "-";
-  char text[32];
-  std::snprintf(text, sizeof text, std::abs(value) < 1e5 ? "%.2f" : "%.3g", value);
-  return std::string(text) == "-0.00" ? "0.00" : text;
-}
+std::string number(double value) { return pmeta::shortNumber(value); }
 
 std::string policyFrame(int task, int policy) {
   return "task_" + std::to_string(task) + (policy == Trajectory::META ? "/meta" : "/personal");

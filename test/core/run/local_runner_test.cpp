@@ -139,9 +139,9 @@ TEST(LocalRunner, MetaRowsAreTheReturnsOfTheMetaPolicyAfterTheRound) {
 TEST(LocalRunner, StopsWhenToldSo) {
   std::vector<int> seen;
   const auto stopAt = [&](int round) {
-    return [&seen, round](const RoundSummary& summary) {
-      seen.push_back(summary.round);
-      return summary.round < round;
+    return [&seen, round](const RoundBook::Round& done) {
+      seen.push_back(done.summary.round);
+      return done.summary.round < round;
     };
   };
   const LocalResult result = runLocally(gridExperiment(), nullptr, stopAt(4));

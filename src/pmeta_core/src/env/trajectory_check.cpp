@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "pmeta_core/base/csv_table.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 
 namespace pmeta {
 namespace {
@@ -123,20 +123,10 @@ void compareStep(TrajectorySimulator& simulator, ReplayMode mode, const Row& row
   if (unbounded && mode == ReplayMode::kOpenLoop) ++report.unbounded_steps;
 }
 
-std::string shortNumber(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2g", value);
-  return text;
-}
-
-std::string padded(const std::string& text, std::size_t width) {
-  return text + std::string(text.size() < width ? width - text.size() : 1, ' ');
-}
-
 // "3.1e-14 (line 71)"
 std::string shown(const LargestError& error) {
   if (error.value == 0) return "0";
-  return shortNumber(error.value) + " (line " + std::to_string(error.line) + ")";
+  return significant(error.value, 2) + " (line " + std::to_string(error.line) + ")";
 }
 
 std::string sentence(const Deviation& d) {
@@ -146,7 +136,7 @@ std::string sentence(const Deviation& d) {
          formatNumber(d.simulated) +
          (d.mode == ReplayMode::kSingleStep ? " from the row before"
                                             : " from the sequence's start") +
-         ", tolerance " + shortNumber(d.tolerance);
+         ", tolerance " + significant(d.tolerance, 2);
 }
 
 }  // namespace

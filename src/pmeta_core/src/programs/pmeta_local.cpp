@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <charconv>
-#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -17,8 +16,10 @@
 #include <vector>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 #include "pmeta_core/env/model_check.h"
 #include "pmeta_core/env/trajectory_check.h"
+#include "pmeta_core/run/console.h"
 #include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/run/local_runner.h"
 #include "pmeta_core/run/sweep.h"
@@ -26,8 +27,10 @@
 
 namespace {
 
+using pmeta::duration;
 using pmeta::Error;
 using pmeta::Experiment;
+using pmeta::shortNumber;
 
 constexpr char kUsage[] =
     R"(usage: pmeta_local COMMAND ...
@@ -116,26 +119,6 @@ std::string takeConfig(Arguments& arguments) {
   return config;
 }
 
-std::string shortNumber(double value) {
-  if (std::isnan(value)) return "-";
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f", value);
-  return text;
-}
-
-std::string duration(double seconds) {
-  char text[32];
-  const long whole = std::lround(seconds);
-  if (seconds < 10) {
-    std::snprintf(text, sizeof text, "%.1f s", seconds);
-  } else if (whole < 3600) {
-    std::snprintf(text, sizeof text, "%ld:%02ld min", whole / 60, whole % 60);
-  } else {
-    std::snprintf(text, sizeof text, "%ld:%02ld h", whole / 3600, whole / 60 % 60);
-  }
-  return text;
-}
-
 void printNotes(const Experiment& experiment) {
   for (const std::string& note : experiment.notes()) std::cerr << note << "\n";
 }
@@ -146,20 +129,16 @@ int run(Arguments arguments) {
   pmeta::RunLog log(experiment);
   std::cout << "settings\n" << experiment.table() << std::flush;
   printNotes(experiment);
+  pmeta::RunConsole console(experiment, isatty(STDOUT_FILENO) != 0);
   const pmeta::LocalResult result =
-      pmeta::runLocally(experiment, &log, [&](const pmeta::RoundSummary& summary) {
-        if (!experiment.evaluates(summary.round)) return !g_stop;
-        const std::string test =
-            experiment.numTestTasks() == 0 ? "" : "  test " + shortNumber(summary.test_return);
-        std::printf("round %d/%d  PP %s  MP %s%s  %s  ETA %s\n", summary.round, summary.rounds,
-                    shortNumber(summary.personal_return).c_str(),
-                    shortNumber(summary.meta_return).c_str(), test.c_str(),
-                    duration(summary.seconds).c_str(), duration(summary.eta_seconds).c_str());
-        std::fflush(stdout);
+      pmeta::runLocally(experiment, &log, [&](const pmeta::RoundBook::Round& round) {
+        const std::string line = console.take(round);
+        if (!line.empty()) std::cout << line << std::endl;
         return !g_stop;
       });
   log.finish(result.stopped ? "stopped" : "finished");
-  std::cout << (result.stopped ? "stopped; " : "") << "results in " << log.dir() << std::endl;
+  std::cout << console.table() << (result.stopped ? "stopped; " : "")
+            << pmeta::listRunFolder(log.dir()) << std::flush;
   return result.stopped ? 130 : 0;
 }
 

@@ -50,7 +50,7 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
       if (fresh_episodes > 0 && !done.rows.empty())
         fresh.offer(done, agents, aggregator.metaPolicy());
       if (log != nullptr) log->write(done);
-      if (on_round && !on_round(done.summary)) {
+      if (on_round && !on_round(done)) {
         result.stopped = round < experiment.settings().rounds;
       }
       result.rounds.push_back(std::move(done));

@@ -200,7 +200,7 @@ std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
         const Clock::time_point start = Clock::now();
         RunLog log(*open[i]);
         const LocalResult result =
-            runLocally(*open[i], &log, [&](const RoundSummary&) { return !stop; });
+            runLocally(*open[i], &log, [&](const RoundBook::Round&) { return !stop; });
         log.finish(result.stopped ? "stopped" : "finished");
         if (result.stopped) return;
         const std::lock_guard<std::mutex> lock(mutex);

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/base/version.h"
 #include "pmeta_core/run/experiment.h"
@@ -15,12 +16,7 @@
 namespace pmeta {
 namespace {
 
-std::string shortNumber(double value) {
-  if (std::isnan(value)) return "-";
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
+std::string shortText(double value) { return significant(value, 4); }
 
 // lines of numbers and words under a header
 class CsvText {
@@ -136,14 +132,9 @@ std::string manifestText(const ConvergenceReport& report) {
   return manifest.dump(2) + "\n";
 }
 
-std::string padded(const std::string& text, std::size_t width, bool right = false) {
-  const std::string blanks(width > text.size() ? width - text.size() : 0, ' ');
-  return right ? blanks + text : text + blanks;
-}
-
 std::string range(const std::vector<double>& values) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  return shortNumber(*low) + ".." + shortNumber(*high);
+  return shortText(*low) + ".." + shortText(*high);
 }
 
 }  // namespace
@@ -171,8 +162,8 @@ std::string convergenceTable(const ConvergenceReport& report) {
   std::ostringstream out;
   out << "Task sets (Assumption 1)   sigma   sigma_1,i       sigma_2,i        R_max\n";
   for (const DiversityRow& set : report.diversities) {
-    out << "  " << padded(set.diversity, 22) << padded(shortNumber(set.sigma), 8, true) << "   "
-        << padded(range(set.sigma1), 16) << padded(range(set.sigma2), 17) << shortNumber(set.r_max)
+    out << "  " << padded(set.diversity, 22) << padded(shortText(set.sigma), 8, true) << "   "
+        << padded(range(set.sigma1), 16) << padded(range(set.sigma2), 17) << shortText(set.r_max)
         << "\n";
   }
 
@@ -198,8 +189,8 @@ std::string convergenceTable(const ConvergenceReport& report) {
   for (const Statement& s : all) {
     if (s.statement != previous) out << "\n";
     // a claim that stands on many lines is named once
-    line(s.statement == previous ? "" : s.statement, s.setting, shortNumber(s.measured),
-         shortNumber(s.bound), s.holds, s.remark);
+    line(s.statement == previous ? "" : s.statement, s.setting, shortText(s.measured),
+         shortText(s.bound), s.holds, s.remark);
     previous = s.statement;
   }
   return out.str();

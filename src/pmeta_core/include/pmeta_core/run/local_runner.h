@@ -20,8 +20,8 @@ struct LocalResult {
   std::vector<FreshReturn> fresh;  ///< with fresh_episodes: the kept policies on fresh episodes
 };
 
-/// Called after each round; false stops the run.
-using OnRound = std::function<bool(const RoundSummary&)>;
+/// Called with the record of each round; false stops the run.
+using OnRound = std::function<bool(const RoundBook::Round&)>;
 
 /// Runs the whole experiment in this process and thread, with the very classes the nodes use and
 /// the same result bit for bit. Files are written if `log` is given: those of RunLog, and the last

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+namespace pmeta {
+
+// Numbers as people read them, with dots whatever the locale is: Qt, for one, sets the C locale
+// from the environment. What a program reads back is written by formatNumber().
+
+/// Two decimals, or three significant digits from 1e5 on; "-" where there is no number.
+std::string shortNumber(double value);
+
+/// So many significant digits, as printf's %g; "-" for NaN.
+std::string significant(double value, int digits);
+
+/// Three significant digits with k, M or G for thousands, millions and billions, e.g. "12.3k"; "-"
+/// where there is no number.
+std::string shortCount(double value);
+
+/// "4.2 s", "1:05 min" or "2:03 h"; "-" where there is no number.
+std::string duration(double seconds);
+
+/// The text with blanks up to `width` after it, or before it if `right`.
+std::string padded(const std::string& text, std::size_t width, bool right = false);
+
+}  // namespace pmeta

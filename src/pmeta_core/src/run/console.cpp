@@ -1,0 +1,158 @@
+#include "pmeta_core/run/console.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "pmeta_core/base/format.h"
+
+namespace pmeta {
+namespace {
+
+constexpr int kBarWidth = 20;
+constexpr std::size_t kNumberWidth = 11;
+constexpr std::size_t kBestWidth = 20;
+const char* const kMean = "mean";
+const char* const kTestMean = "mean of test tasks";
+
+std::string bestText(double best, int round) {
+  if (std::isnan(best)) return "-";
+  return shortNumber(best) + padded("(" + std::to_string(round) + ")", 8, true);
+}
+
+std::string bytesText(double bytes) {
+  if (bytes < 999.5) return significant(bytes, 3) + " B";
+  if (bytes < 999.5e3) return significant(bytes / 1e3, 3) + " kB";
+  return significant(bytes / 1e6, 3) + " MB";
+}
+
+}  // namespace
+
+RunConsole::RunConsole(const Experiment& experiment, bool terminal)
+    : num_tasks_(experiment.numTasks()),
+      rounds_(experiment.settings().rounds),
+      adapted_(experiment.contextEpisodes().back()),
+      terminal_(terminal),
+      tasks_(experiment.totalTasks()),
+      cumulative_steps_(experiment.totalTasks(), 0) {
+  for (int task = 0; task < experiment.totalTasks(); ++task) {
+    names_.push_back(experiment.family().taskName(task));
+  }
+}
+
+void RunConsole::Course::add(double value, int round) {
+  if (std::isnan(value)) return;
+  last = value;
+  if (std::isnan(best) || value > best) {
+    best = value;
+    best_round = round;
+  }
+}
+
+void RunConsole::takeRows(const RoundBook::Round& round) {
+  for (const RoundRow& row : round.rows) {
+    const TaskReturn& result = row.result;
+    Courses& courses = tasks_.at(result.task);
+    if (result.policy == Policy::kPersonal) {
+      courses.personal.add(result.mean, result.round);
+    } else if (result.context_episodes == adapted_) {
+      courses.meta.add(result.mean, result.round);
+    }
+    std::int64_t& before = cumulative_steps_.at(result.task);
+    steps_ += row.env_steps - before;
+    before = row.env_steps;
+  }
+  const RoundSummary& summary = round.summary;
+  means_.personal.add(summary.personal_return, summary.round);
+  means_.meta.add(summary.meta_return, summary.round);
+  test_.add(summary.test_return, summary.round);
+}
+
+std::string RunConsole::take(const RoundBook::Round& round) {
+  const RoundSummary& summary = round.summary;
+  seconds_ += summary.seconds;
+  if (round.rows.empty()) return "";
+  evaluated_ = true;
+  takeRows(round);
+  const double speed = seconds_ > 0 ? static_cast<double>(steps_) / seconds_
+                                    : std::numeric_limits<double>::quiet_NaN();
+  seconds_ = 0;
+  steps_ = 0;
+
+  const int tenths = static_cast<int>(10LL * summary.round / rounds_);
+  if (!terminal_ && tenths == printed_tenths_) return "";
+  printed_tenths_ = tenths;
+  const std::string all = std::to_string(rounds_);
+  const std::string bar = terminal_ ? progressBar(summary.round, rounds_, kBarWidth) + " " : "";
+  std::string line = bar + "round " + padded(std::to_string(summary.round), all.size(), true);
+  line += "/" + all + "  PP " + shortNumber(summary.personal_return) + "  MP " +
+          shortNumber(summary.meta_return);
+  if (num_tasks_ < static_cast<int>(tasks_.size())) {
+    line += "  test " + shortNumber(summary.test_return);
+  }
+  return line + "  " + shortCount(speed) + " steps/s  ETA " + duration(summary.eta_seconds);
+}
+
+std::string RunConsole::tableLine(const std::string& name, const Courses& courses,
+                                  std::size_t width) const {
+  const auto columns = [](const Course& course) {
+    return padded(shortNumber(course.last), kNumberWidth, true) +
+           padded(bestText(course.best, course.best_round), kBestWidth, true);
+  };
+  return padded(name, width) + columns(courses.personal) + columns(courses.meta) + "\n";
+}
+
+std::string RunConsole::table() const {
+  if (!evaluated_) return "";
+  const bool tests = num_tasks_ < static_cast<int>(tasks_.size());
+  std::vector<std::string> labels;
+  for (std::size_t task = 0; task < tasks_.size(); ++task) {
+    labels.push_back(std::to_string(task) + " " + names_[task] +
+                     (static_cast<int>(task) < num_tasks_ ? "" : " (test)"));
+  }
+  std::size_t width = std::string(tests ? kTestMean : kMean).size();
+  for (const std::string& label : labels) width = std::max(width, label.size());
+
+  const auto heads = [](const std::string& policy) {
+    return padded(policy + " last", kNumberWidth, true) +
+           padded(policy + " best (round)", kBestWidth, true);
+  };
+  std::string text = padded("task", width) + heads("PP") + heads("MP") + "\n";
+  for (std::size_t task = 0; task < tasks_.size(); ++task) {
+    text += tableLine(labels[task], tasks_[task], width);
+  }
+  text += tableLine(kMean, means_, width);
+  if (tests) text += tableLine(kTestMean, {Course(), test_}, width);
+  return text;
+}
+
+std::string progressBar(int done, int all, int width) {
+  const int cells = all <= 0 ? 0 : static_cast<int>(static_cast<long long>(width) * done / all);
+  const int full = std::min(std::max(cells, 0), width);
+  std::string bar(full, '=');
+  if (full > 0 && full < width) bar.back() = '>';
+  return "[" + bar + std::string(width - full, ' ') + "]";
+}
+
+std::string listRunFolder(const std::string& dir) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> lines;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(dir, error)) {
+    const std::string name = entry.path().filename().string();
+    if (entry.is_directory(error)) {
+      const auto files = std::distance(fs::directory_iterator(entry.path(), error), {});
+      lines.push_back("  " + padded(name + "/", 16) + std::to_string(files) +
+                      (files == 1 ? " file" : " files"));
+    } else {
+      lines.push_back("  " + padded(name, 16) +
+                      bytesText(static_cast<double>(entry.file_size(error))));
+    }
+  }
+  std::sort(lines.begin(), lines.end());
+  std::string text = "results in " + dir + "\n";
+  for (const std::string& line : lines) text += line + "\n";
+  return text;
+}
+
+}  // namespace pmeta

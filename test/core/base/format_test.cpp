@@ -1,0 +1,103 @@
+#include "pmeta_core/base/format.h"
+
+#include <gtest/gtest.h>
+
+#include <clocale>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <locale>
+
+#include "../support.h"
+
+namespace pmeta {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TEST(Format, ShortNumbersHaveTwoDecimals) {
+  EXPECT_EQ(shortNumber(-14.442976), "-14.44");
+  EXPECT_EQ(shortNumber(0.005001), "0.01");
+  EXPECT_EQ(shortNumber(-0.001), "0.00") << "no minus before zero";
+  EXPECT_EQ(shortNumber(99999), "99999.00");
+  EXPECT_EQ(shortNumber(-123456), "-1.23e+05");
+  EXPECT_EQ(shortNumber(kNan), "-");
+  EXPECT_EQ(shortNumber(kInfinity), "-");
+}
+
+TEST(Format, SignificantDigitsAreThoseOfPrintf) {
+  for (const double value :
+       {0.0, 1.0, -0.000123456, 31.41592653, 1e5, 123456.7, 1e-300, kInfinity}) {
+    for (const int digits : {2, 4}) {
+      char text[32];
+      std::snprintf(text, sizeof text, "%.*g", digits, value);
+      EXPECT_EQ(significant(value, digits), text);
+    }
+  }
+  EXPECT_EQ(significant(kNan, 2), "-");
+}
+
+TEST(Format, CountsHaveThreeDigitsAndAUnit) {
+  EXPECT_EQ(shortCount(0), "0");
+  EXPECT_EQ(shortCount(12.34), "12.3");
+  EXPECT_EQ(shortCount(999.4), "999");
+  EXPECT_EQ(shortCount(999.6), "1k");
+  EXPECT_EQ(shortCount(12345), "12.3k");
+  EXPECT_EQ(shortCount(4.56e6), "4.56M");
+  EXPECT_EQ(shortCount(7.8e9), "7.8G");
+  EXPECT_EQ(shortCount(1.5e12), "1.5e+03G");
+  EXPECT_EQ(shortCount(kNan), "-");
+}
+
+TEST(Format, DurationsAreInSecondsMinutesOrHours) {
+  EXPECT_EQ(duration(0), "0.0 s");
+  EXPECT_EQ(duration(4.21), "4.2 s");
+  EXPECT_EQ(duration(10), "0:10 min");
+  EXPECT_EQ(duration(65.4), "1:05 min");
+  EXPECT_EQ(duration(3599.6), "1:00 h");
+  EXPECT_EQ(duration(7380), "2:03 h");
+  EXPECT_EQ(duration(kNan), "-");
+}
+
+TEST(Format, PaddedTextHasItsWidthOnEitherSide) {
+  EXPECT_EQ(padded("ab", 4), "ab  ");
+  EXPECT_EQ(padded("ab", 4, true), "  ab");
+  EXPECT_EQ(padded("abcd", 4), "abcd");
+  EXPECT_EQ(padded("abcde", 4), "abcde");
+}
+
+// a C++ locale that writes "1.234,5"
+struct Comma : std::numpunct<char> {
+  char do_decimal_point() const override { return ','; }
+  char do_thousands_sep() const override { return '.'; }
+  std::string do_grouping() const override { return "\3"; }
+};
+
+TEST(Format, HasDotsWhateverTheCppLocaleIs) {
+  const std::locale before = std::locale::global(std::locale(std::locale(), new Comma));
+  const std::string all = shortNumber(12345.5) + " " + significant(0.25, 2) + " " +
+                          shortCount(1500) + " " + duration(4.2);
+  std::locale::global(before);
+  EXPECT_EQ(all, "12345.50 0.25 1.5k 4.2 s");
+}
+
+TEST(Format, HasDotsWhateverTheCLocaleIs) {
+  const test::TempDir dir;
+  const std::string compile =
+      "localedef -i de_DE -f UTF-8 " + dir / "de_DE.UTF-8" + " > /dev/null 2>&1";
+  if (std::system(compile.c_str()) != 0) GTEST_SKIP() << "no localedef, or no locale de_DE";
+  const test::ScopedVariable path("LOCPATH", dir.path().c_str());
+  const std::string before = std::setlocale(LC_ALL, nullptr);
+  ASSERT_NE(std::setlocale(LC_ALL, "de_DE.UTF-8"), nullptr);
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f", 0.5);
+  const std::string all =
+      shortNumber(-3.5) + " " + significant(0.25, 2) + " " + shortCount(1500) + " " + duration(4.2);
+  std::setlocale(LC_ALL, before.c_str());
+  EXPECT_STREQ(text, "0,5") << "the locale does not write commas: this test shows nothing";
+  EXPECT_EQ(all, "-3.50 0.25 1.5k 4.2 s");
+}
+
+}  // namespace
+}  // namespace pmeta
