@@ -59,4 +59,35 @@ visualization_msgs::Marker policyMarker(const std::string& frame, const std::str
   return figure.take();
 }
 
+/// A policy's path over its card (namespace "paths"), or its deletion where there is no episode:
+/// `at` gives the point of a step. Meta's line is wider and lies below, so that both are seen where
+/// they agree.
+template <class At>
+visualization_msgs::Marker pathMarker(const std::string& frame, int task, int policy, double layer,
+                                      const PolicyView& view, std::size_t most_points,
+                                      double meta_width, double personal_width, At&& at) {
+  const bool is_meta = policy == pmeta_msgs::Trajectory::META;
+  return policyMarker(
+      frame, "paths", task, policy, layer + (is_meta ? 0 : 0.02), view.episode != nullptr,
+      [&](Figure& figure) {
+        std::vector<Point> path;
+        for (const std::size_t step : thinnedSteps(numSteps(*view.episode), most_points)) {
+          path.push_back(at(step));
+        }
+        figure.polyline(path, is_meta ? meta_width : personal_width,
+                        mix(policyColor(policy), kWhite, is_meta ? 0.35 : 0.1));
+      });
+}
+
+/// draw(view, task, policy, seconds) for each lane; `seconds` by task.
+template <class Draw>
+void forEachLane(const Cards& cards, const SceneContent& content,
+                 const std::vector<double>& seconds, Draw&& draw) {
+  for (int task = 0; task < cards.num_tasks; ++task) {
+    for (const int policy : policiesOf(cards, task)) {
+      draw(viewOf(content, task, policy), task, policy, seconds.at(task));
+    }
+  }
+}
+
 }  // namespace pmeta_nodes

@@ -120,11 +120,10 @@ MarkerArray CartPoleScene::still(const SceneContent& content) const {
 
 MarkerArray CartPoleScene::moving(const SceneContent& content, const std::vector<double>& seconds) {
   MarkerArray scene;
-  for (int task = 0; task < cards_.num_tasks; ++task) {
-    for (const int policy : policiesOf(cards_, task)) {
-      drawMoving(viewOf(content, task, policy), task, policy, seconds.at(task), scene);
-    }
-  }
+  forEachLane(cards_, content, seconds,
+              [&](const PolicyView& view, int task, int policy, double at) {
+                drawMoving(view, task, policy, at, scene);
+              });
   return scene;
 }
 

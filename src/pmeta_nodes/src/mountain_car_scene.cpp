@@ -153,30 +153,20 @@ MarkerArray MountainCarScene::still(const SceneContent& content) const {
   return scene;
 }
 
-/// Meta's line is wider and lies below, so that both are seen where they agree.
 visualization_msgs::Marker MountainCarScene::drawPath(const PolicyView& view, int task,
                                                       int policy) const {
-  const bool is_meta = policy == Trajectory::META;
-  Figure figure(phaseFrame(task), "paths", policyId(task, policy),
-                kPathLayer + (is_meta ? 0 : 0.02));
-  if (!view.episode) return figure.take();
-  std::vector<Point> path;
-  for (const std::size_t step : thinnedSteps(numSteps(*view.episode), kMostPathPoints)) {
-    path.push_back(phasePoint(*view.episode, step));
-  }
-  figure.polyline(path, (is_meta ? 0.034 : 0.016) * scale(),
-                  mix(policyColor(policy), kWhite, is_meta ? 0.35 : 0.1));
-  return figure.take();
+  return pathMarker(phaseFrame(task), task, policy, kPathLayer, view, kMostPathPoints,
+                    0.034 * scale(), 0.016 * scale(),
+                    [&](std::size_t step) { return phasePoint(*view.episode, step); });
 }
 
 MarkerArray MountainCarScene::moving(const SceneContent& content,
                                      const std::vector<double>& seconds) {
   MarkerArray scene;
-  for (int task = 0; task < cards_.num_tasks; ++task) {
-    for (const int policy : policiesOf(cards_, task)) {
-      drawMoving(viewOf(content, task, policy), task, policy, seconds.at(task), scene);
-    }
-  }
+  forEachLane(cards_, content, seconds,
+              [&](const PolicyView& view, int task, int policy, double at) {
+                drawMoving(view, task, policy, at, scene);
+              });
   return scene;
 }
 

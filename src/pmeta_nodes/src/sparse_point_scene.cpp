@@ -125,30 +125,20 @@ MarkerArray SparsePointScene::still(const SceneContent& content) const {
   return scene;
 }
 
-/// Meta's line is wider and lies below, so that both are seen where they agree.
 visualization_msgs::Marker SparsePointScene::drawPath(const PolicyView& view, int task,
                                                       int policy) const {
-  const bool is_meta = policy == Trajectory::META;
-  Figure figure(planeFrame(task), "paths", policyId(task, policy),
-                kPathLayer + (is_meta ? 0 : 0.02));
-  if (!view.episode) return figure.take();
-  std::vector<Point> path;
-  for (const std::size_t step : thinnedSteps(numSteps(*view.episode), kMostPathPoints)) {
-    path.push_back(pointAt(*view.episode, step));
-  }
-  figure.polyline(path, (is_meta ? 0.05 : 0.022) * scale(),
-                  mix(policyColor(policy), kWhite, is_meta ? 0.35 : 0.1));
-  return figure.take();
+  return pathMarker(planeFrame(task), task, policy, kPathLayer, view, kMostPathPoints,
+                    0.05 * scale(), 0.022 * scale(),
+                    [&](std::size_t step) { return pointAt(*view.episode, step); });
 }
 
 MarkerArray SparsePointScene::moving(const SceneContent& content,
                                      const std::vector<double>& seconds) {
   MarkerArray scene;
-  for (int task = 0; task < cards_.num_tasks; ++task) {
-    for (const int policy : policiesOf(cards_, task)) {
-      drawMoving(viewOf(content, task, policy), task, policy, seconds.at(task), scene);
-    }
-  }
+  forEachLane(cards_, content, seconds,
+              [&](const PolicyView& view, int task, int policy, double at) {
+                drawMoving(view, task, policy, at, scene);
+              });
   return scene;
 }
 

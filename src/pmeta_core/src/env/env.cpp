@@ -31,4 +31,11 @@ void requireState(const EnvSpec& spec, const std::vector<double>& state, std::si
   }
 }
 
+std::vector<std::unique_ptr<Env>> makeEnvs(const std::function<std::unique_ptr<Env>(int k)>& make,
+                                           int count) {
+  std::vector<std::unique_ptr<Env>> envs;
+  for (int k = 0; k < count; ++k) envs.push_back(make(k));
+  return envs;
+}
+
 }  // namespace pmeta

@@ -3,34 +3,21 @@
 #include <algorithm>
 
 namespace pmeta {
-namespace {
-
-using Environments = std::vector<std::unique_ptr<Env>>;
-
-Environments environments(const std::function<std::unique_ptr<Env>(int k)>& make, int n) {
-  Environments envs;
-  for (int k = 0; k < n; ++k) envs.push_back(make(k));
-  return envs;
-}
-
-Environments copies(const std::function<std::unique_ptr<Env>()>& make_env, int n) {
-  return environments([&](int) { return make_env(); }, n);
-}
-
-}  // namespace
 
 DqnPersonalLearner::DqnPersonalLearner(
     const std::function<std::unique_ptr<Env>()>& make_env, const DqnSettings& settings,
     const ProximalAdamSettings& optimizer, std::int64_t total_updates,
     const std::function<std::unique_ptr<Env>(int k)>& make_training_env)
-    : learner_(make_training_env ? environments(make_training_env, settings.num_envs)
-                                 : copies(make_env, settings.num_envs),
+    : learner_(makeEnvs(
+                   make_training_env ? make_training_env : [&](int) { return make_env(); },
+                   settings.num_envs),
                settings, total_updates),
       layout_(Precision::kFloat32, learner_.network().blocks()),
       personal_(layout_),
       auxiliary_(layout_),
       optimizer_(personal_.floats().data(), auxiliary_.floats().data(), layout_.size(), optimizer),
-      evaluation_(std::make_unique<Evaluation>(copies(make_env, settings.evaluation_episodes))),
+      evaluation_(std::make_unique<Evaluation>(
+          makeEnvs([&](int) { return make_env(); }, settings.evaluation_episodes))),
       evaluation_workspace_(std::make_unique<MlpWorkspace>(
           learner_.network(), static_cast<std::size_t>(settings.evaluation_episodes))) {}
 

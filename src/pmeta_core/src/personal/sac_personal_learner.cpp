@@ -7,13 +7,6 @@
 namespace pmeta {
 namespace {
 
-std::vector<std::unique_ptr<Env>> copies(const std::function<std::unique_ptr<Env>()>& make_env,
-                                         int n) {
-  std::vector<std::unique_ptr<Env>> envs;
-  for (int i = 0; i < n; ++i) envs.push_back(make_env());
-  return envs;
-}
-
 std::vector<float> taskInputOf(const SacSettings& settings, int task, int num_tasks) {
   return settings.task_encoding == "one_hot" ? oneHot(task, num_tasks) : std::vector<float>();
 }
@@ -50,7 +43,8 @@ SacPersonalLearner::SacPersonalLearner(const std::function<std::unique_ptr<Env>(
       personal_(ownedModel(layout_, learner_)),
       auxiliary_(personal_),
       optimizer_(personal_.floats().data(), auxiliary_.floats().data(), layout_.size(), optimizer),
-      evaluation_(std::make_unique<Evaluation>(copies(make_env, settings.evaluation_episodes))),
+      evaluation_(std::make_unique<Evaluation>(
+          makeEnvs([&](int) { return make_env(); }, settings.evaluation_episodes))),
       evaluation_workspace_(std::make_unique<SacNetworks::ActorWorkspace>(
           learner_.networks(), static_cast<std::size_t>(settings.evaluation_episodes))),
       exploration_env_(learner_.networks().hasEncoder() ? make_env() : nullptr) {

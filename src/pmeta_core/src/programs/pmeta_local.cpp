@@ -18,6 +18,7 @@
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/env/model_check.h"
+#include "pmeta_core/env/tabular_env.h"
 #include "pmeta_core/env/trajectory_check.h"
 #include "pmeta_core/run/console.h"
 #include "pmeta_core/run/loaded_policy.h"
@@ -185,9 +186,10 @@ int settings(const Arguments& arguments) {
   const std::string environment = arguments.words.empty() ? "gridworld" : arguments.words[0];
   const auto family = pmeta::makeEnvFamily(environment);
   family->build(0);
-  const bool continuous = family->make(0)->spec().num_actions == 0;
-  const std::string learner =
-      environment == "gridworld" ? "q_learning" : (continuous ? "sac" : "dqn");
+  const auto env = family->make(0);
+  const bool tabular = dynamic_cast<const pmeta::TabularEnv*>(env.get()) != nullptr;
+  const bool discrete = env->spec().num_actions > 0;
+  const std::string learner = tabular ? "q_learning" : (discrete ? "dqn" : "sac");
   std::cout << Experiment::describe(environment, learner);
   return 0;
 }

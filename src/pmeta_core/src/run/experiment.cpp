@@ -319,8 +319,8 @@ std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
     SacSettings sac = e.sac;
     // nothing is learnt on a test task: no replay
     if (isTestTask(task)) sac.buffer_size = sac.batch_size;
-    return std::make_unique<SacPersonalLearner>(
-        make_env, sac, optimizer, std::min(task, numTasks() - 1), numTasks(), lambdas);
+    return std::make_unique<SacPersonalLearner>(make_env, sac, optimizer, task, numTasks(),
+                                                lambdas);
   }
   std::unique_ptr<Env> env = family_->make(task);
   auto* tabular = dynamic_cast<TabularEnv*>(env.get());

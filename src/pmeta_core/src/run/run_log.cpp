@@ -32,7 +32,7 @@ RoundBook::RoundBook(const Experiment& experiment)
     : num_tasks_(experiment.numTasks()),
       total_tasks_(experiment.totalTasks()),
       contexts_(experiment.contextEpisodes()),
-      evaluation_interval_(experiment.settings().evaluation_interval),
+      evaluations_(experiment.evaluationSchedule()),
       rounds_(experiment.settings().rounds),
       expects_meta_(experiment.evaluatesMeta()),
       run_id_(experiment.settings().run_id),
@@ -41,7 +41,7 @@ RoundBook::RoundBook(const Experiment& experiment)
 
 bool RoundBook::add(const TaskReturn& result) {
   if (result.run_id != run_id_ || result.task < 0 || result.task >= total_tasks_ ||
-      result.round < next_ || result.round > rounds_ || !evaluates(result.round)) {
+      result.round < next_ || result.round > rounds_ || !evaluations_.includes(result.round)) {
     return false;
   }
   // what no agent of this run evaluates
@@ -80,13 +80,9 @@ bool RoundBook::Open::hasMeta(int task, const std::vector<int>& contexts) const 
   });
 }
 
-bool RoundBook::evaluates(int round) const {
-  return round % evaluation_interval_ == 0 || round == rounds_;
-}
-
 bool RoundBook::isComplete(int round, const Open& open) const {
   if (!open.closed) return false;
-  if (!evaluates(round)) return true;
+  if (!evaluations_.includes(round)) return true;
   for (const int task : open.summary.participants) {
     if (!open.hasPersonal(task)) return false;
   }
@@ -125,7 +121,7 @@ std::vector<RoundBook::Round> RoundBook::take(bool force) {
 }
 
 bool RoundBook::hasPersonal(int round) const {
-  if (!evaluates(round)) return true;
+  if (!evaluations_.includes(round)) return true;
   const auto it = open_.find(round);
   if (it == open_.end()) return false;
   for (int task = 0; task < num_tasks_; ++task) {
@@ -136,7 +132,7 @@ bool RoundBook::hasPersonal(int round) const {
 
 std::vector<int> RoundBook::awaited() const {
   std::vector<int> tasks;
-  if (next_ > rounds_ || !evaluates(next_)) return tasks;
+  if (next_ > rounds_ || !evaluations_.includes(next_)) return tasks;
   const auto it = open_.find(next_);
   // a closed round does without the personal returns of those it missed
   const auto owesPersonal = [&](int task) {
@@ -182,8 +178,7 @@ void RunLog::finish(const std::string& status) { writeManifest(status); }
 
 const char* RunLog::csvHeader() {
   return "round,task,split,policy,context_episodes,return_mean,return_std,episodes,env_steps,"
-         "updates,"
-         "wall_s";
+         "updates,wall_s";
 }
 
 std::string RunLog::csvLine(const RoundRow& row) {

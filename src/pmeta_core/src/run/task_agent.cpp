@@ -33,8 +33,7 @@ TaskAgent::TaskAgent(const Experiment& experiment, int task)
       updates_per_round_(experiment.settings().updates_per_round),
       keeps_personal_(experiment.keepsPersonal()),
       sends_personal_(experiment.sendsPersonal()),
-      evaluation_interval_(experiment.settings().evaluation_interval),
-      rounds_(experiment.settings().rounds),
+      evaluations_(experiment.evaluationSchedule()),
       catch_up_(experiment.settings().aggregation.catch_up),
       learner_(experiment.makeLearner(task)) {}
 
@@ -59,7 +58,7 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   result.distance = distance(learner_->personal(), meta.model);
   env_steps_ += result.env_steps;
   updates_ += result.updates;
-  if (evaluates(round)) {
+  if (evaluations_.includes(round)) {
     Rng evaluation = evaluationRng();
     TaskReturn personal =
         makeReturn(round, Policy::kPersonal, learner_->evaluate(learner_->personal(), evaluation));
@@ -78,7 +77,7 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
 std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) {
   checkModel(meta.model, learner_->layout(), "the aggregator");
   std::vector<TaskReturn> results;
-  if (!evaluates(meta.round)) return results;
+  if (!evaluations_.includes(meta.round)) return results;
   const Stopwatch watch;
   Rng rng = evaluationRng();
   for (const AdaptedReturn& adapted : learner_->evaluateAdapted(meta.model, rng)) {
@@ -126,10 +125,6 @@ void TaskAgent::adjustWeight(double personal_return) {
   const double scale = std::max(std::abs(personal_return), 1e-9);
   const double gap = std::clamp((personal_return - *meta_return_) / scale, 0.0, 1.0);
   log_weight_ = kWeightMemory * log_weight_ + catch_up_ * gap;
-}
-
-bool TaskAgent::evaluates(int round) const {
-  return round % evaluation_interval_ == 0 || round == rounds_;
 }
 
 // the same draws for every policy and round: differences are the policies', not the dice's

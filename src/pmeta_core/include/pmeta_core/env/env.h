@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -88,6 +89,10 @@ class EnvFamily {
   /// A new environment of that task. The family must outlive it.
   virtual std::unique_ptr<Env> make(int task) const = 0;
 };
+
+/// `count` environments: make(0), make(1), ...
+std::vector<std::unique_ptr<Env>> makeEnvs(const std::function<std::unique_ptr<Env>(int k)>& make,
+                                           int count);
 
 /// The family of that name, with its default settings. Throws Error listing the known names.
 std::unique_ptr<EnvFamily> makeEnvFamily(const std::string& name);

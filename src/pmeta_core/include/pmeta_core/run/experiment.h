@@ -21,8 +21,15 @@ struct AggregationSettings {
   double beta = 1;            ///< mixing: meta <- (1 - beta) meta + beta mean
   int quorum = 0;             ///< updates that suffice once round_timeout has passed; 0 means all
   double round_timeout = 30;  ///< seconds before a round counts as late
-  double catch_up =
-      0;  ///< how much more tasks count on which the meta-policy lags; 0: all the same
+  double catch_up = 0;        ///< how much more tasks count on which the meta-policy lags
+};
+
+/// The rounds in which policies are evaluated: every `interval`-th, and the last.
+struct EvaluationSchedule {
+  int interval = 1;
+  int rounds = 1;  ///< C
+
+  bool includes(int round) const { return round % interval == 0 || round == rounds; }
 };
 
 /// Everything that defines a run, with defaults.
@@ -81,9 +88,8 @@ class Experiment {
     return settings_.algorithm == "pmeta" || settings_.algorithm == "model_averaging";
   }
   bool keepsPersonal() const { return settings_.personal.personal_init == "keep"; }
-  /// Are policies evaluated in this round? Every evaluation_interval-th one, and the last.
-  bool evaluates(int round) const {
-    return round % settings_.evaluation_interval == 0 || round == settings_.rounds;
+  EvaluationSchedule evaluationSchedule() const {
+    return {settings_.evaluation_interval, settings_.rounds};
   }
   int quorum() const;  ///< updates needed once the deadline has passed
 

@@ -59,12 +59,11 @@ class RoundBook {
     bool hasMeta(int task, const std::vector<int>& contexts) const;
   };
   bool isComplete(int round, const Open& open) const;
-  bool evaluates(int round) const;
 
   int num_tasks_;    ///< training tasks
   int total_tasks_;  ///< with the test tasks
   std::vector<int> contexts_;
-  int evaluation_interval_;
+  EvaluationSchedule evaluations_;
   int rounds_;
   bool expects_meta_;
   std::string run_id_;

@@ -34,7 +34,8 @@ class TaskAgent {
   const ModelLayout& layout() const { return learner_->layout(); }
 
   /// One round from `meta`: reset, R updates, and evaluation of the personal policy where
-  /// Experiment::evaluates(). Nothing if stopped. Throws Error if the meta-policy does not fit.
+  /// Experiment::evaluationSchedule() has it. Nothing if stopped. Throws Error if the meta-policy
+  /// does not fit.
   std::optional<RoundResult> trainRound(const MetaPolicy& meta, const KeepGoing& keep_going = {});
 
   /// The meta-policy on this task: one return for each of Experiment::contextEpisodes(), or none
@@ -54,7 +55,6 @@ class TaskAgent {
   Episode recordMeta(const MetaPolicy& meta) const;
 
  private:
-  bool evaluates(int round) const;
   void adjustWeight(double personal_return);
   Rng evaluationRng() const;
   TaskReturn makeReturn(int round, Policy policy, const ReturnStats& stats) const;
@@ -66,8 +66,7 @@ class TaskAgent {
   int updates_per_round_;
   bool keeps_personal_;
   bool sends_personal_;
-  int evaluation_interval_;
-  int rounds_;
+  EvaluationSchedule evaluations_;
   std::int64_t env_steps_ = 0;  // since the last evaluation
   std::int64_t updates_ = 0;
   double catch_up_;
