@@ -2,50 +2,20 @@
 import csv
 import json
 import pathlib
-import random
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
 
 import pytest
 
-TOP = pathlib.Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(TOP / "src/pmeta_nodes/scripts"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "src/pmeta_nodes/scripts"))
 import pmeta_bags
 import pmeta_returns
 import pmeta_runs
 
-LOCAL = TOP / "devel/lib/pmeta_core/pmeta_local"
-CONFIG = TOP / "config/gridworld.yaml"
-
-
-def run(command, timeout=120, **kwargs):
-    """The finished process, with its standard output and error as text."""
-    return subprocess.run([str(word) for word in command], stdout=subprocess.PIPE,
-                          stderr=subprocess.PIPE, universal_newlines=True, timeout=timeout,
-                          **kwargs)
-
-
-def free_port():
-    """A port that nobody listens on, below those that the system gives to connections."""
-    while True:
-        port = random.randint(20000, 32000)
-        with socket.socket() as probe:
-            if probe.connect_ex(("127.0.0.1", port)) != 0:
-                return port
-
-
-def environment(tmp_path, setup="devel/setup.bash"):
-    """An environment for ROS programs, with a master port and a home of its own."""
-    lines = run(["bash", "-c", ". %s && env -0" % (TOP / setup)],
-                env={"PATH": "/usr/bin:/bin:/usr/sbin:/sbin", "HOME": str(tmp_path)}).stdout
-    env = dict(line.split("=", 1) for line in lines.split("\0") if "=" in line)
-    env.update(ROS_HOME=str(tmp_path / "ros"), ROS_IP="127.0.0.1",
-               ROS_MASTER_URI="http://127.0.0.1:%d" % free_port())
-    return env
+from programs import CONFIG, LOCAL, TOP, environment, run
 
 
 def rows_without_time(path):

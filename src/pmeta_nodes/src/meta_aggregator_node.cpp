@@ -4,8 +4,12 @@
 #include <ros/callback_queue.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
+#include <ctime>
+#include <iterator>
 #include <sstream>
+#include <utility>
 
 #include "conversions.h"
 #include "node_main.h"
@@ -20,6 +24,9 @@ using Verdict = pmeta::MetaAggregator::Verdict;
 
 constexpr std::chrono::duration<double> kTick{0.02};
 constexpr auto kAnnounceEvery = std::chrono::seconds(5);
+// agents give a sign of life twice a second
+constexpr std::chrono::duration<double> kSilence{1.5};
+constexpr std::chrono::duration<double> kStartUp{15};
 // for the last messages to reach everybody before the node, and with it the launch, ends
 constexpr double kFarewell = 0.5;
 
@@ -29,6 +36,14 @@ constexpr char kPaused[] =
     "called with false";
 
 bool isTerminal() { return isatty(STDOUT_FILENO) != 0; }
+
+std::string timeOfDay(std::time_t time) {
+  std::tm local{};
+  localtime_r(&time, &local);
+  char text[16];
+  std::strftime(text, sizeof text, "%H:%M:%S", &local);
+  return text;
+}
 
 // a console line of ours for each line: roslaunch mixes the nodes' output
 void logLines(const std::string& text) {
@@ -45,6 +60,7 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
       book_(experiment),
       log_(experiment),
       console_(experiment, isTerminal()),
+      roll_call_(experiment.totalTasks(), kSilence, kStartUp),
       mailbox_(8 * static_cast<std::size_t>(experiment.totalTasks()) + 16) {
   summary_.run_id = experiment.settings().run_id;
   summary_.experiment = experiment.settings().experiment;
@@ -65,6 +81,14 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
       boost::function<void(const pmeta_msgs::TaskReturn::ConstPtr&)>(
           [this](const pmeta_msgs::TaskReturn::ConstPtr& msg) { mailbox_.push(msg); }),
       ros::VoidConstPtr(), hints);
+  status_sub_ = nh_.subscribe<pmeta_msgs::AgentStatus>(
+      "agent_status", queue,
+      boost::function<void(const pmeta_msgs::AgentStatus::ConstPtr&)>(
+          [this](const pmeta_msgs::AgentStatus::ConstPtr& msg) {
+            if (msg->run_id == experiment_.settings().run_id)
+              roll_call_.heard(static_cast<int>(msg->task));
+          }),
+      ros::VoidConstPtr(), hints);
   pause_service_ = nh_.advertiseService("pause", &MetaAggregatorNode::onPause, this);
   health_ = std::make_unique<Health>(experiment.settings().experiment, "meta aggregator",
                                      [this] { return health(); });
@@ -78,13 +102,8 @@ MetaAggregatorNode::~MetaAggregatorNode() {
 }
 
 int MetaAggregatorNode::spin() {
-  bool told = false;
-  while (!stopRequested()) {
+  while (!stopRequested() && !(done_ && !hold_)) {
     ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
-    if (!done_) continue;
-    if (!hold_ || failed_) break;
-    if (!told) ROS_INFO("the run is over; holding the scene and topics until Ctrl-C.");
-    told = true;
   }
   stop_ = true;
   mailbox_.close();
@@ -135,7 +154,7 @@ void MetaAggregatorNode::runRounds() {
     writeCompleteRounds(false);
     announcePause();
     closeRoundIfDue();
-    announceLateness();
+    announceMissing();
   }
   rounds_over_ = true;
   const bool finished = book_.roundsTaken() == rounds;
@@ -253,10 +272,17 @@ void MetaAggregatorNode::publishMetaPolicy() {
 
 void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& message) {
   const bool paused = pause_announced_ && state == RoundSummary::RUNNING;
+  const bool silent = !silent_.empty() && !paused && state == RoundSummary::RUNNING;
+  if (silent) state = RoundSummary::LATE;
   summary_.state = paused ? static_cast<std::uint8_t>(RoundSummary::PAUSED) : state;
-  summary_.message = paused ? kPaused + (message.empty() ? "" : "; " + message) : message;
+  summary_.message = paused   ? kPaused + (message.empty() ? "" : "; " + message)
+                     : silent ? silenceText() + "; " + message
+                              : message;
   summary_.header.stamp = ros::Time::now();
+  const std::vector<std::uint32_t> of_last_round = summary_.missing;
+  if (silent) summary_.missing.assign(silent_.begin(), silent_.end());
   round_pub_.publish(summary_);
+  summary_.missing = of_last_round;
 
   const std::lock_guard<std::mutex> lock(health_mutex_);
   health_report_ = {};
@@ -290,26 +316,63 @@ void MetaAggregatorNode::announcePause() {
   }
 }
 
-void MetaAggregatorNode::announceLateness() {
+void MetaAggregatorNode::announceMissing() {
+  const std::vector<int> silent = roll_call_.silent();
+  if (silent != silent_) {
+    const bool any = !silent.empty();
+    const std::vector<int> before = std::exchange(silent_, silent);
+    std::vector<int> back;
+    std::set_difference(before.begin(), before.end(), silent.begin(), silent.end(),
+                        std::back_inserter(back));
+    if (!back.empty()) ROS_INFO("%s: heard of again.", taskNames(back).c_str());
+    if (any) ROS_WARN("%s; %s", silenceText().c_str(), waitText().c_str());
+    publishRound(RoundSummary::RUNNING, any ? waitText() : "running");
+  }
   // who is paused waits for nobody
   if (pause_announced_ || Clock::now() < next_announcement_) return;
   next_announcement_ = Clock::now() + kAnnounceEvery;
   // an update may be in and only a return missing
   const std::vector<int> missing = aggregator_.complete() ? book_.awaited() : aggregator_.missing();
   if (missing.empty()) return;
-  const int round = std::min(aggregator_.metaPolicy().round + 1, experiment_.settings().rounds);
-  const bool by_quorum = experiment_.quorum() < experiment_.numTasks();
-  const std::string message =
-      "round " + std::to_string(round) + " has waited " +
-      std::to_string(std::lround(roundSeconds())) + " s for " + taskNames(missing) +
-      (by_quorum ? "; it goes on once " + std::to_string(experiment_.quorum()) + " of " +
-                       std::to_string(experiment_.numTasks()) + " tasks have reported"
-                 : "; it goes on when they report");
+  const std::string message = "round " + std::to_string(roundInHand()) + " has waited " +
+                              std::to_string(std::lround(roundSeconds())) + " s for " +
+                              taskNames(missing) + "; " + waitText();
   const std::vector<std::uint32_t> of_last_round = summary_.missing;
   summary_.missing.assign(missing.begin(), missing.end());
   publishRound(RoundSummary::LATE, message);
   summary_.missing = of_last_round;
   ROS_WARN("%s", message.c_str());
+}
+
+int MetaAggregatorNode::roundInHand() const {
+  return std::min(aggregator_.metaPolicy().round + 1, experiment_.settings().rounds);
+}
+
+// who is missing, since when
+std::string MetaAggregatorNode::silenceText() const {
+  std::vector<std::string> words;
+  for (const int task : silent_) {
+    const std::time_t since =
+        std::time(nullptr) - static_cast<std::time_t>(std::lround(roll_call_.silence(task)));
+    words.push_back(taskNames({task}) +
+                    (roll_call_.known(task) ? " is silent since " : " has not shown up since ") +
+                    timeOfDay(since));
+  }
+  return pmeta::join(words);
+}
+
+// what happens next
+std::string MetaAggregatorNode::waitText() const {
+  const std::string round = "round " + std::to_string(roundInHand());
+  const int tasks = experiment_.numTasks();
+  if (experiment_.quorum() >= tasks) {
+    return round + " waits until all " + std::to_string(tasks) + " tasks have reported";
+  }
+  const double left = experiment_.settings().aggregation.round_timeout - roundSeconds();
+  const std::string enough = std::to_string(experiment_.quorum()) + " of " + std::to_string(tasks) +
+                             " tasks have reported";
+  return round + " goes on without them " +
+         (left > 0 ? "in " + std::to_string(std::lround(left)) + " s if " : "once ") + enough;
 }
 
 std::string MetaAggregatorNode::taskNames(const std::vector<int>& tasks) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <pmeta_msgs/AgentStatus.h>
 #include <pmeta_msgs/AuxiliaryUpdate.h>
 #include <pmeta_msgs/RoundSummary.h>
 #include <pmeta_msgs/TaskReturn.h>
@@ -21,6 +22,7 @@
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/meta_aggregator.h"
 #include "pmeta_core/run/run_log.h"
+#include "roll_call.h"
 
 namespace pmeta_nodes {
 
@@ -28,7 +30,8 @@ namespace pmeta_nodes {
 ///
 /// Subscribes to auxiliary and returns; publishes meta_policy and round (both latched), and writes
 /// the run folder. A round is closed once every task's update and return are in, or, after
-/// round_timeout, once a quorum of updates is; while someone is missing `round` names who.
+/// round_timeout, once a quorum of updates is. Who has not been heard of for 1.5 s, or is late, is
+/// named on `round`: since when, and what happens next.
 ///
 /// The service `pause` (true) holds the next meta-policy back, so that agents wait once the round
 /// in hand is done; `pause` (false) lets the run go on. Only time passes: the result is the same.
@@ -59,7 +62,10 @@ class MetaAggregatorNode {
   void publishMetaPolicy();
   void announcePause();
   void publishRound(std::uint8_t state, const std::string& message);
-  void announceLateness();
+  void announceMissing();
+  int roundInHand() const;
+  std::string silenceText() const;
+  std::string waitText() const;
   std::string taskNames(const std::vector<int>& tasks) const;
   double roundSeconds() const;
   HealthReport health();
@@ -75,12 +81,15 @@ class MetaAggregatorNode {
   std::optional<Clock::time_point> held_since_;  ///< the round is due, but the run is paused
   bool pause_announced_ = false;
   pmeta_msgs::RoundSummary summary_;  ///< of the last complete round
+  RollCall roll_call_;
+  std::vector<int> silent_;  ///< as announced
 
   ros::NodeHandle nh_;
   ros::Publisher meta_pub_;
   ros::Publisher round_pub_;
   ros::Subscriber auxiliary_sub_;
   ros::Subscriber returns_sub_;
+  ros::Subscriber status_sub_;
   ros::ServiceServer pause_service_;
   Mailbox<Message> mailbox_;
 

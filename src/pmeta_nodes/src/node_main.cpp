@@ -4,13 +4,16 @@
 #include <csignal>
 #include <cstring>
 #include <iostream>
+#include <memory>
 
+#include "master_watch.h"
 #include "pmeta_core/base/error.h"
 
 namespace pmeta_nodes {
 namespace {
 
 std::atomic<bool> g_stop{false};
+std::unique_ptr<MasterWatch> g_master;
 
 void onSignal(int) { g_stop = true; }
 
@@ -32,7 +35,15 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
   const ros::NodeHandle nh;
   try {
     const pmeta::Experiment experiment = readExperiment(nh, ros::NodeHandle("~"));
-    const int code = body(experiment);
+    g_master = std::make_unique<MasterWatch>();
+    int code = body(experiment);
+    const std::string trouble = g_master->trouble();
+    if (!trouble.empty()) {
+      ROS_FATAL("%s: this node has stopped. Start the run again with resume:=%s.", trouble.c_str(),
+                experiment.runDir().c_str());
+      code = 1;
+    }
+    g_master.reset();
     ros::shutdown();
     return code;
   } catch (const std::exception& error) {
@@ -42,7 +53,7 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
   }
 }
 
-bool stopRequested() { return g_stop || !ros::ok(); }
+bool stopRequested() { return g_stop || !ros::ok() || (g_master && !g_master->trouble().empty()); }
 
 pmeta::Experiment readExperiment(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh) {
   std::string file;

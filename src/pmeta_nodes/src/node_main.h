@@ -15,7 +15,7 @@ namespace pmeta_nodes {
 int runNode(int argc, char** argv, const std::string& name, const std::string& help,
             const std::function<int(const pmeta::Experiment&)>& body);
 
-/// SIGINT or SIGTERM came, or ROS is shutting down.
+/// SIGINT or SIGTERM came, ROS is shutting down, or its master is gone (see MasterWatch).
 bool stopRequested();
 
 /// The experiment from `~config_file`, if given, or else from the parameter `config`, which the

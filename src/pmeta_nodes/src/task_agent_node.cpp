@@ -63,7 +63,7 @@ TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task)
   setState(AgentStatus::WAITING, "waiting for a meta-policy");
   meta_sub_ = nh_.subscribe("meta_policy", 1, &TaskAgentNode::onMetaPolicy, this, hints);
   round_sub_ = nh_.subscribe("round", 4, &TaskAgentNode::onRound, this, hints);
-  status_timer_ = nh_.createWallTimer(ros::WallDuration(1.0),
+  status_timer_ = nh_.createWallTimer(ros::WallDuration(0.5),
                                       [this](const ros::WallTimerEvent&) { publishStatus(); });
   resend_timer_ =
       nh_.createWallTimer(ros::WallDuration(0.5), [this](const ros::WallTimerEvent&) { resend(); });
