@@ -36,6 +36,11 @@ def process(command, log, env):
         started.wait()
 
 
+def master(port):
+    # roscore would leave it behind when killed
+    return ["rosmaster", "--core", "-p", port]
+
+
 @contextlib.contextmanager
 def run_without_roslaunch(tmp_path, env):
     """A master, an aggregator and the agents, each started by hand; gives the processes by name."""
@@ -48,7 +53,7 @@ def run_without_roslaunch(tmp_path, env):
         def start(name, *command):
             return stack.enter_context(process(command, tmp_path / (name + ".log"), env))
         port = env["ROS_MASTER_URI"].rsplit(":", 1)[1]
-        nodes = {"master": start("master", "roscore", "-p", port)}
+        nodes = {"master": start("master", *master(port))}
         assert wait_until(lambda: run(["rosparam", "list"], env=env).returncode == 0)
         for task in range(5):
             name = "task_agent_%d" % task
@@ -72,13 +77,13 @@ def test_nodes_stop_and_say_so_when_the_master_is_gone(tmp_path, restarted):
     folder = tmp_path / "results/gridworld/faults"
     with run_without_roslaunch(tmp_path, env) as nodes:
         assert wait_until(lambda: rounds_written(folder) >= 3)
-        master = nodes.pop("master")
-        os.killpg(master.pid, signal.SIGKILL)
-        master.wait()
+        first = nodes.pop("master")
+        os.killpg(first.pid, signal.SIGKILL)
+        first.wait()
         port = env["ROS_MASTER_URI"].rsplit(":", 1)[1]
         with contextlib.ExitStack() as stack:
             if restarted:
-                stack.enter_context(process(["roscore", "-p", port], tmp_path / "master2.log", env))
+                stack.enter_context(process(master(port), tmp_path / "master2.log", env))
             for name, node in nodes.items():
                 node.wait(timeout=60)
                 said = (tmp_path / (name + ".log")).read_text()
