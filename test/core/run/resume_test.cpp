@@ -93,10 +93,10 @@ nlohmann::json manifestOf(const Experiment& experiment) {
 TEST(Resume, EqualsARunWithoutInterruptionBitForBit) {
   for (const std::string& kind : checkpointKinds()) {
     const TempDir dir;
-    const Experiment whole = checkpointExperiment(kind, dir / "whole");
+    const Experiment whole = checkpointExperiment(kind, dir / "whole", {"checkpoint.interval:=0"});
     finish(whole);
     const Record expected = recordOf(whole);
-    for (const int round : {1, 2, 3, 5, 6}) {
+    for (const int round : {2, 3, 6}) {
       const Experiment killed = checkpointExperiment(kind, dir / std::to_string(round));
       runUntilCrash(killed, round);
       EXPECT_EQ(resume(killed), round);
@@ -108,7 +108,7 @@ TEST(Resume, EqualsARunWithoutInterruptionBitForBit) {
 TEST(Resume, GoesOnFromWhereARunWasStopped) {
   for (const std::string& kind : checkpointKinds()) {
     const TempDir dir;
-    const Experiment whole = checkpointExperiment(kind, dir / "whole");
+    const Experiment whole = checkpointExperiment(kind, dir / "whole", {"checkpoint.interval:=0"});
     finish(whole);
     // several times, and between two checkpoints
     const Experiment parts = checkpointExperiment(kind, dir / "parts", {"checkpoint.interval:=4"});

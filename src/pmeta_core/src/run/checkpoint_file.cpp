@@ -31,11 +31,23 @@ constexpr std::uint64_t kOverhead = 1 << 20;  // of HDF5, and to leave some room
 constexpr std::size_t kVersionAt = 8, kLengthAt = 16, kHashAt = 24;
 using UserBlock = std::array<unsigned char, kUserBlock>;
 
-// HDF5 need not have been built for more than one thread, and sweeps have many
-std::mutex& libraryMutex() {
-  static std::mutex mutex;
-  return mutex;
-}
+/// The right to call HDF5, which need not have been built for more than one thread.
+class Hdf5Lock {
+ public:
+  Hdf5Lock() : lock_(mutex()) {
+    // at exit it would trip over a file that it could not close, as where the disk was full
+    static const herr_t kNoCleanUp = H5dont_atexit();
+    static_cast<void>(kNoCleanUp);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex mutex;
+    return mutex;
+  }
+  std::lock_guard<std::mutex> lock_;
+};
 
 std::string lastError() { return std::strerror(errno); }
 
@@ -257,8 +269,7 @@ void writeCheckpoint(const std::string& path, const CheckpointIdentity& identity
   requireRoom(dir, counter.bytes() + kOverhead);
   try {
     {
-      const std::lock_guard<std::mutex> lock(libraryMutex());
-      H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+      const Hdf5Lock lock;
       Hdf5Writer writer(temporary);
       writeIdentity(writer, identity);
       writer.part("state", State{save});
@@ -268,7 +279,9 @@ void writeCheckpoint(const std::string& path, const CheckpointIdentity& identity
     std::filesystem::rename(temporary, path);
     syncFolder(dir);
   } catch (...) {
+    // HDF5 may still have it open: give its room back
     std::error_code ignored;
+    std::filesystem::resize_file(temporary, 0, ignored);
     std::filesystem::remove(temporary, ignored);
     throw;
   }
@@ -408,14 +421,13 @@ std::string partyName(int task) {
 
 CheckpointFile::CheckpointFile(const std::string& path) : path_(path) {
   checkFile(path);
-  const std::lock_guard<std::mutex> lock(libraryMutex());
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  const Hdf5Lock lock;
   reader_ = std::make_unique<Reader>(path);
   identity_ = readIdentity(*reader_);
 }
 
 CheckpointFile::~CheckpointFile() {
-  const std::lock_guard<std::mutex> lock(libraryMutex());
+  const Hdf5Lock lock;
   reader_.reset();
 }
 
@@ -442,7 +454,7 @@ void CheckpointFile::require(const CheckpointIdentity& expected) const {
 }
 
 void CheckpointFile::load(const std::function<void(StateReader&)>& load) {
-  const std::lock_guard<std::mutex> lock(libraryMutex());
+  const Hdf5Lock lock;
   Loader loader{load};
   reader_->part("state", loader);
 }
