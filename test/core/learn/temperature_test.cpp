@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "../memory_state.h"
+
 namespace pmeta {
 namespace {
 
@@ -52,7 +54,7 @@ TEST(Temperature, StaysWhereFixed) {
 TEST(Temperature, GoesOnFromItsState) {
   Temperature a({}, 2), b({}, 2);
   for (int t = 0; t < 5; ++t) a.update(t);
-  b.restore(a.state());
+  test::load(b, test::stateOf(a));
   a.update(3);
   b.update(3);
   EXPECT_EQ(a.value(), b.value());

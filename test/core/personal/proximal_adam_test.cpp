@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "../allocations.h"
+#include "../memory_state.h"
 #include "../support.h"
 #include "pmeta_core/nn/kernels.h"
 #include "pmeta_core/nn/mlp.h"
@@ -231,12 +232,13 @@ TEST(ProximalAdam, GoesOnFromARestoredState) {
   update(first);
   copy = phi;
   ProximalAdam second(copy.data(), nullptr, 20, {});
-  second.restore(first.updates(), first.firstMoment(), first.secondMoment());
+  test::load(second, test::stateOf(first));
   update(first);
   update(second);
   EXPECT_EQ(phi, copy);
-  EXPECT_EQ(test::errorOf([&] { second.restore(1, AlignedFloats(3), AlignedFloats(20)); }),
-            "Adam has moments of 20 parameters, not of 3 and 20.");
+  second.reset();
+  EXPECT_EQ(second.firstMoment(), AlignedFloats(20));
+  EXPECT_EQ(second.secondMoment(), AlignedFloats(20));
 }
 
 TEST(ProximalAdam, RefusesSettingsOutOfRange) {

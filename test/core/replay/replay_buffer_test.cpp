@@ -7,6 +7,7 @@
 #include <fstream>
 #include <string>
 
+#include "../memory_state.h"
 #include "../support.h"
 
 namespace pmeta {
@@ -78,7 +79,7 @@ TEST(ReplayBuffer, GoesOnFromWhatItHandsOut) {
     ReplayBuffer a(5, 1, 1), b(5, 1, 1);
     for (int i = 0; i < count; ++i) add(a, static_cast<float>(i));
     add(b, 100);
-    b.restore(a.values(), a.next());
+    test::load(b, test::stateOf(a));
     for (int i = 0; i < 3; ++i) {
       add(a, static_cast<float>(10 + i));
       add(b, static_cast<float>(10 + i));
@@ -90,13 +91,26 @@ TEST(ReplayBuffer, GoesOnFromWhatItHandsOut) {
 }
 
 TEST(ReplayBuffer, RefusesWhatDoesNotFit) {
-  ReplayBuffer buffer(4, 1, 1);
-  EXPECT_EQ(test::errorOf([&] { buffer.restore(std::vector<float>(9), 0); }),
-            "a replay of 9 numbers, next slot 0, does not fit one of 4 transitions of 5 numbers: "
-            "restore it with the settings it was saved with.");
-  EXPECT_NE(test::errorOf([&] { buffer.restore(std::vector<float>(25), 0); }), "(no error)");
-  EXPECT_NE(test::errorOf([&] { buffer.restore(std::vector<float>(10), 0); }), "(no error)");
-  EXPECT_NE(test::errorOf([&] { buffer.restore(std::vector<float>(20), 4); }), "(no error)");
+  const auto refusal = [](std::size_t values, std::int64_t next) {
+    ReplayBuffer buffer(4, 1, 1);
+    test::MemoryState state;
+    state.set("values", std::vector<float>(values));
+    state.set("next", std::vector<std::int64_t>{next});
+    return test::errorOf([&] { test::load(buffer, state); });
+  };
+  EXPECT_EQ(refusal(9, 1),
+            "the saved state does not fit this run: values has 9 values, which are no transitions "
+            "of 5.");
+  EXPECT_EQ(refusal(25, 0),
+            "the saved state does not fit this run: values has 25 values but at most 20 have a "
+            "place.");
+  EXPECT_EQ(refusal(10, 0),
+            "the saved state does not fit this run: next is 0 but must be from 2 to 2.");
+  EXPECT_EQ(refusal(20, 4),
+            "the saved state does not fit this run: next is 4 but must be from 0 to 3.");
+  EXPECT_NE(refusal(20, -1), "(no error)");
+  EXPECT_EQ(refusal(20, 3), "(no error)");
+  EXPECT_EQ(refusal(0, 0), "(no error)");
 }
 
 }  // namespace

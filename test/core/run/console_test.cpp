@@ -31,7 +31,7 @@ RoundBook::Round roundOf(int round, double personal, double meta, double seconds
       row.result.task = task;
       row.result.policy = policy;
       row.result.mean = (policy == Policy::kPersonal ? personal : meta) + (task == 0 ? -1 : 1);
-      row.env_steps = 100 * round;
+      row.env_steps = row.result.env_steps = 100 * round;
       done.rows.push_back(row);
     }
   }

@@ -121,6 +121,24 @@ bool Model::operator==(const Model& other) const {
          std::memcmp(bytes(), other.bytes(), byteCount()) == 0;
 }
 
+void Model::saveState(StateWriter& writer) const {
+  std::visit([&](const auto& v) { writer.array("values", v); }, values);
+}
+
+void Model::loadState(StateReader& reader) {
+  std::visit(
+      [&](auto& v) {
+        reader.array("values", v);
+        for (std::size_t k = 0; k < v.size(); ++k) {
+          if (isPresent(k) && !std::isfinite(v[k])) {
+            reader.refuse("values",
+                          "holds a value that is not finite (entry " + std::to_string(k) + ")");
+          }
+        }
+      },
+      values);
+}
+
 void checkModel(const Model& model, const ModelLayout& expected, const std::string& who) {
   if (model.layout != expected) {
     throw Error(who + " sent a model of layout " + hexHash(model.layout.hash()) +

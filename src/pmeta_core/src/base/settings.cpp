@@ -434,6 +434,20 @@ YAML::Node loadYamlFile(const std::string& path) {
   return parseYaml(text.str(), path);
 }
 
+std::map<std::string, std::string> flatSettings(const YAML::Node& map) {
+  std::map<std::string, std::string> values;
+  for (const auto& item : map) {
+    const std::string key = item.first.Scalar();
+    if (!item.second.IsMap()) {
+      values[key] = YAML::Dump(item.second);
+      continue;
+    }
+    for (const auto& inner : flatSettings(item.second))
+      values[key + "." + inner.first] = inner.second;
+  }
+  return values;
+}
+
 std::string nearest(const std::string& word, const std::vector<std::string>& candidates) {
   std::string best;
   std::size_t best_distance = std::max<std::size_t>(2, word.size() / 4) + 1;

@@ -16,6 +16,15 @@ void Env::setState(const std::vector<double>&) {
   throw Error("environment '" + spec().name + "' cannot take up a state.");
 }
 
+void Env::saveState(StateWriter& writer) const { writer.array("state", state()); }
+
+void Env::loadState(StateReader& reader) {
+  std::vector<double> saved(state().size());
+  reader.array("state", saved);
+  setState(saved);
+  if (saved.back() >= spec().horizon) reader.refuse("state", "is of an episode that is over");
+}
+
 void requireState(const EnvSpec& spec, const std::vector<double>& state, std::size_t size) {
   if (state.size() != size) {
     throw Error("a state of " + spec.name + " has " + std::to_string(state.size()) +

@@ -1,6 +1,8 @@
 #include "pmeta_core/learn/dqn.h"
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/nn/kernels.h"
@@ -203,6 +205,45 @@ double DqnLearner::computeOutputGradient(const float* q_values) {
   std::fill(output_gradient_.begin(), output_gradient_.end(), 0.0f);
   for (int b = 0; b < settings_.batch_size; ++b) output_gradient_[entry(b)] = sample_gradient_[b];
   return loss;
+}
+
+void DqnLearner::saveState(StateWriter& writer) const {
+  writer.flag("started", started_);
+  writer.count("updates", updates_);
+  writer.count("newest_target", newest_target_);
+  writer.array("targets", targets_);
+  writer.part("replay", replay_);
+  writer.part("n_step", n_step_);
+  if (!started_) return;
+  writer.array("observations", observations_);
+  for (std::size_t i = 0; i < envs_.size(); ++i) writer.part("env_" + std::to_string(i), *envs_[i]);
+}
+
+void DqnLearner::loadState(StateReader& reader) {
+  started_ = reader.flag("started");
+  updates_ = reader.count("updates");
+  newest_target_ =
+      static_cast<int>(reader.count("newest_target", 0, settings_.averaged_targets - 1));
+  reader.array("targets", targets_);
+  reader.part("replay", replay_);
+  reader.part("n_step", n_step_);
+  // actions become indices
+  for (std::size_t slot = 0; slot < replay_.size(); ++slot) {
+    if (!isAction(*replay_.buffer()[slot].action)) reader.refuse("replay", "holds no action");
+  }
+  for (const NStepAccumulator::Queue& queue : n_step_.queues()) {
+    for (const float action : queue.actions) {
+      if (!isAction(action)) reader.refuse("n_step", "holds no action");
+    }
+  }
+  if (!started_) return;
+  if (replay_.size() == 0) reader.refuse("replay", "is empty after the warm-up");
+  reader.array("observations", observations_);
+  for (std::size_t i = 0; i < envs_.size(); ++i) reader.part("env_" + std::to_string(i), *envs_[i]);
+}
+
+bool DqnLearner::isAction(float action) const {
+  return action >= 0 && action < static_cast<float>(num_actions_) && action == std::floor(action);
 }
 
 }  // namespace pmeta

@@ -313,42 +313,43 @@ LatentPosterior SacLearner::contextPosterior(const float* parameters) const {
   return posterior;
 }
 
-SacState SacLearner::state() const {
-  SacState state;
-  state.replay = replay_.values();
-  state.replay_next = replay_.next();
-  state.context = context_.values();
-  state.context_next = context_.next();
-  state.targets = targets_;
-  state.temperature = temperature_.state();
-  state.updates = updates_;
-  state.episodes = episodes_;
-  state.started = started_;
-  state.prior_episode = prior_episode_;
-  if (started_) state.env_state = env_->state();
-  state.observation = observation_;
-  state.task_input = task_input_;
-  return state;
+void SacLearner::saveState(StateWriter& writer) const {
+  writer.flag("started", started_);
+  writer.count("updates", updates_);
+  writer.count("episodes", episodes_);
+  writer.flag("prior_episode", prior_episode_);
+  writer.array("targets", targets_);
+  writer.part("temperature", temperature_);
+  writer.part("replay", replay_);
+  writer.part("context", context_);
+  if (!started_) return;
+  writer.array("observation", observation_);
+  writer.array("task_input", task_input_);
+  writer.part("env", *env_);
 }
 
-void SacLearner::restore(const SacState& state) {
-  if (state.targets.size() != targets_.size() || state.observation.size() != observation_size_ ||
-      state.task_input.size() != task_input_.size()) {
-    throw Error(
-        "a state of soft actor-critic does not fit these networks: restore it with the "
-        "settings and the task it was saved with.");
+void SacLearner::loadState(StateReader& reader) {
+  started_ = reader.flag("started");
+  updates_ = reader.count("updates");
+  episodes_ = reader.count("episodes");
+  prior_episode_ = reader.flag("prior_episode");
+  reader.array("targets", targets_);
+  reader.part("temperature", temperature_);
+  reader.part("replay", replay_);
+  reader.part("context", context_);
+  if (!started_) return;
+  if (replay_.size() == 0) reader.refuse("replay", "is empty after the start");
+  if (networks_.hasEncoder() && context_.size() == 0) {
+    reader.refuse("context", "is empty after the start");
   }
-  replay_.restore(state.replay, state.replay_next);
-  context_.restore(state.context, state.context_next);
-  if (state.started) env_->setState(state.env_state);
-  targets_ = state.targets;
-  temperature_.restore(state.temperature);
-  updates_ = state.updates;
-  episodes_ = state.episodes;
-  started_ = state.started;
-  prior_episode_ = state.prior_episode;
-  observation_ = state.observation;
-  task_input_ = state.task_input;
+  reader.array("observation", observation_);
+  std::vector<float> task_input(task_input_.size());
+  reader.array("task_input", task_input);
+  if (!networks_.hasEncoder() && task_input != task_input_) {
+    reader.refuse("task_input", "is that of another task");
+  }
+  task_input_ = std::move(task_input);
+  reader.part("env", *env_);
 }
 
 }  // namespace pmeta

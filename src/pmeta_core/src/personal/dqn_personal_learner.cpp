@@ -65,4 +65,20 @@ Episode DqnPersonalLearner::record(const Model& policy, Rng& rng) const {
   return evaluation_->record(greedy(policy), rng);
 }
 
+void DqnPersonalLearner::saveState(StateWriter& writer) const {
+  writer.flag("has_personal", has_personal_);
+  writer.part("personal", personal_);
+  writer.part("auxiliary", auxiliary_);
+  writer.part("learner", learner_);
+  writer.part("optimizer", optimizer_);
+}
+
+void DqnPersonalLearner::loadState(StateReader& reader) {
+  has_personal_ = reader.flag("has_personal");
+  reader.part("personal", personal_);
+  reader.part("auxiliary", auxiliary_);
+  reader.part("learner", learner_);
+  reader.part("optimizer", optimizer_);
+}
+
 }  // namespace pmeta

@@ -1,5 +1,6 @@
 #include "pmeta_core/personal/proximal_adam.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -83,16 +84,22 @@ void ProximalAdam::move(std::size_t offset, const float* gradient, std::size_t n
                  lambda == 0 || auxiliary_ == nullptr ? nullptr : auxiliary_ + offset, target, n);
 }
 
-void ProximalAdam::restore(std::uint64_t updates, const AlignedFloats& first_moment,
-                           const AlignedFloats& second_moment) {
-  if (first_moment.size() != size() || second_moment.size() != size()) {
-    throw Error("Adam has moments of " + std::to_string(size()) + " parameters, not of " +
-                std::to_string(first_moment.size()) + " and " +
-                std::to_string(second_moment.size()) + ".");
-  }
-  updates_ = updates;
-  first_moment_ = first_moment;
-  second_moment_ = second_moment;
+void ProximalAdam::reset() {
+  updates_ = 0;
+  std::fill(first_moment_.begin(), first_moment_.end(), 0.0f);
+  std::fill(second_moment_.begin(), second_moment_.end(), 0.0f);
+}
+
+void ProximalAdam::saveState(StateWriter& writer) const {
+  writer.count("updates", updates_);
+  writer.array("first_moment", first_moment_);
+  writer.array("second_moment", second_moment_);
+}
+
+void ProximalAdam::loadState(StateReader& reader) {
+  updates_ = reader.count("updates");
+  reader.array("first_moment", first_moment_);
+  reader.array("second_moment", second_moment_);
 }
 
 }  // namespace pmeta

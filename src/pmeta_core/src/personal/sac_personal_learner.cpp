@@ -89,10 +89,7 @@ void SacPersonalLearner::beginRound(const Model& meta, bool keep_personal) {
   }
   const SacSettings& settings = learner_.settings();
   if (!has_personal_ || settings.targets_at_round == "meta") learner_.resetTargets(values.data());
-  if (settings.reset_moments) {
-    const AlignedFloats zeros(layout_.size());
-    optimizer_.restore(0, zeros, zeros);
-  }
+  if (settings.reset_moments) optimizer_.reset();
   has_personal_ = true;
 }
 
@@ -145,6 +142,22 @@ std::vector<AdaptedReturn> SacPersonalLearner::evaluateAdapted(const Model& poli
         {adaptation.episodes, evaluation_->run(greedy(policy, adaptation.latent), same_starts)});
   }
   return returns;
+}
+
+void SacPersonalLearner::saveState(StateWriter& writer) const {
+  writer.flag("has_personal", has_personal_);
+  writer.part("personal", personal_);
+  writer.part("auxiliary", auxiliary_);
+  writer.part("learner", learner_);
+  writer.part("optimizer", optimizer_);
+}
+
+void SacPersonalLearner::loadState(StateReader& reader) {
+  has_personal_ = reader.flag("has_personal");
+  reader.part("personal", personal_);
+  reader.part("auxiliary", auxiliary_);
+  reader.part("learner", learner_);
+  reader.part("optimizer", optimizer_);
 }
 
 }  // namespace pmeta

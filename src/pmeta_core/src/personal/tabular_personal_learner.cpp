@@ -109,4 +109,16 @@ Episode TabularPersonalLearner::record(const Model& policy, Rng& rng) const {
   return episode;
 }
 
+void TabularPersonalLearner::saveState(StateWriter& writer) const {
+  writer.flag("has_personal", has_personal_);
+  writer.part("personal", personal_);
+  writer.part("auxiliary", auxiliary_);
+}
+
+void TabularPersonalLearner::loadState(StateReader& reader) {
+  has_personal_ = reader.flag("has_personal");
+  reader.part("personal", personal_);
+  reader.part("auxiliary", auxiliary_);
+}
+
 }  // namespace pmeta

@@ -37,6 +37,8 @@ constexpr char kUsage[] =
     R"(usage: pmeta_local COMMAND ...
 
   run CONFIG [key:=value ...]          run an experiment in this process
+  run CONFIG resume:=RUN_DIR           go on with a run that was stopped or killed, from its newest
+                                       checkpoints and with its own settings
   sweep CONFIG key:=a,b,c ... [--name NAME] [--jobs N]
                                        run it for every combination of values; seed:=0-9 is a range.
                                        Run again to go on where it stopped.
@@ -124,19 +126,57 @@ void printNotes(const Experiment& experiment) {
   for (const std::string& note : experiment.notes()) std::cerr << note << "\n";
 }
 
+// takes "resume:=RUN_DIR" out of the assignments; "" if it is not among them
+std::string takeResume(Arguments& arguments) {
+  const std::string key = "resume:=";
+  std::string dir;
+  std::vector<std::string> others;
+  for (const std::string& word : arguments.words) {
+    if (word.rfind(key, 0) != 0) {
+      others.push_back(word);
+    } else if ((dir = word.substr(key.size())).empty()) {
+      throw Error("resume:= needs the folder of a run.");
+    }
+  }
+  if (!dir.empty() && !others.empty()) {
+    throw Error("a run goes on with its own settings: leave out " + others.front() + ".");
+  }
+  arguments.words = others;
+  return dir;
+}
+
+Experiment resumedExperiment(const std::string& config, const std::string& dir) {
+  const std::string wanted = Experiment::load(config).settings().experiment;
+  Experiment experiment = Experiment::resume(dir);
+  if (experiment.settings().experiment != wanted) {
+    throw Error("the run in " + dir + " is of experiment '" + experiment.settings().experiment +
+                "', not of '" + wanted + "': give its own settings file.");
+  }
+  return experiment;
+}
+
 int run(Arguments arguments) {
   const std::string config = takeConfig(arguments);
-  const Experiment experiment = Experiment::load(config, arguments.words);
-  pmeta::RunLog log(experiment);
+  const std::string resume = takeResume(arguments);
+  const Experiment experiment = resume.empty() ? Experiment::load(config, arguments.words)
+                                               : resumedExperiment(config, resume);
+  pmeta::ResumePoint point;
+  if (!resume.empty()) point = pmeta::findResumePoint(experiment);
+  for (const std::string& sentence : point.refused) std::cerr << sentence << "\n";
+  pmeta::RunLog log = resume.empty() ? pmeta::RunLog(experiment)
+                                     : pmeta::RunLog::reopen(experiment, point.rounds_done);
   std::cout << "settings\n" << experiment.table() << std::flush;
   printNotes(experiment);
+  if (point.round > 0) std::cout << "going on after round " << point.round << std::endl;
   pmeta::RunConsole console(experiment, isatty(STDOUT_FILENO) != 0);
-  const pmeta::LocalResult result =
-      pmeta::runLocally(experiment, &log, [&](const pmeta::RoundBook::Round& round) {
+  const pmeta::LocalResult result = pmeta::runLocally(
+      experiment, &log,
+      [&](const pmeta::RoundBook::Round& round) {
         const std::string line = console.take(round);
         if (!line.empty()) std::cout << line << std::endl;
         return !g_stop;
-      });
+      },
+      point.round);
   log.finish(result.stopped ? "stopped" : "finished");
   std::cout << console.table() << (result.stopped ? "stopped; " : "")
             << pmeta::listRunFolder(log.dir()) << std::flush;

@@ -1,6 +1,7 @@
 #include "pmeta_core/replay/n_step.h"
 
 #include <algorithm>
+#include <string>
 
 namespace pmeta {
 
@@ -45,6 +46,36 @@ void NStepAccumulator::emitOldest(Queue& queue, bool bootstraps, const float* ne
               bootstraps ? static_cast<float>(powers_[queue.size]) : 0.0f, next_observation});
   queue.first = slot(queue, 1);
   --queue.size;
+}
+
+void NStepAccumulator::saveState(StateWriter& writer) const {
+  for (std::size_t i = 0; i < queues_.size(); ++i) {
+    writer.part("queue_" + std::to_string(i), queues_[i]);
+  }
+}
+
+void NStepAccumulator::loadState(StateReader& reader) {
+  for (std::size_t i = 0; i < queues_.size(); ++i) {
+    reader.part("queue_" + std::to_string(i), queues_[i]);
+  }
+}
+
+void NStepAccumulator::Queue::saveState(StateWriter& writer) const {
+  writer.count("first", first);
+  writer.count("size", size);
+  writer.array("observations", observations);
+  writer.array("actions", actions);
+  writer.array("returns", returns);
+}
+
+void NStepAccumulator::Queue::loadState(StateReader& reader) {
+  const auto last = static_cast<std::int64_t>(returns.size()) - 1;
+  first = static_cast<int>(reader.count("first", 0, last));
+  // the n-th step to wait completes the first
+  size = static_cast<int>(reader.count("size", 0, last));
+  reader.array("observations", observations);
+  reader.array("actions", actions);
+  reader.array("returns", returns);
 }
 
 }  // namespace pmeta

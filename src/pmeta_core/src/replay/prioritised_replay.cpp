@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pmeta_core/base/settings.h"
+
 namespace pmeta {
 namespace {
 
 // keeps every transition reachable, however well it is predicted
 constexpr double kLeastPriority = 1e-6;
+constexpr double kMostPriority = 1e39;  // above any float
 
 }  // namespace
 
@@ -59,6 +62,21 @@ void PrioritisedReplay::setPriorities(const ReplayBatch& batch, const float* td_
     const double priority = std::abs(static_cast<double>(td_errors[b])) + kLeastPriority;
     max_priority_ = std::max(max_priority_, priority);
     tree_.set(batch.slots[b], std::pow(priority, alpha_));
+  }
+}
+
+void PrioritisedReplay::saveState(StateWriter& writer) const {
+  writer.part("buffer", buffer_);
+  tree_.saveState(writer, size());
+  writer.value("max_priority", max_priority_);
+}
+
+void PrioritisedReplay::loadState(StateReader& reader) {
+  reader.part("buffer", buffer_);
+  tree_.loadState(reader, size());
+  max_priority_ = reader.finite("max_priority");
+  if (max_priority_ < 1 || max_priority_ > kMostPriority) {
+    reader.refuse("max_priority", "is " + formatNumber(max_priority_) + ", which is none");
   }
 }
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <string>
 
-#include "pmeta_core/base/error.h"
-
 namespace pmeta {
 
 ReplayBuffer::ReplayBuffer(std::size_t capacity, int observation_size, int action_size)
@@ -37,18 +35,24 @@ Transition ReplayBuffer::operator[](std::size_t slot) const {
   return {observation, action, scalars[0], scalars[1], scalars + 2};
 }
 
-void ReplayBuffer::restore(const std::vector<float>& values, std::size_t next) {
-  const std::size_t size = values.size() / stride_;
-  const bool full = size == capacity_;
-  if (values.size() % stride_ != 0 || size > capacity_ || (full ? next >= size : next != size)) {
-    throw Error("a replay of " + std::to_string(values.size()) + " numbers, next slot " +
-                std::to_string(next) + ", does not fit one of " + std::to_string(capacity_) +
-                " transitions of " + std::to_string(stride_) +
-                " numbers: restore it with the settings it was saved with.");
+void ReplayBuffer::saveState(StateWriter& writer) const {
+  writer.array("values", values_);
+  writer.count("next", static_cast<std::int64_t>(next_));
+}
+
+void ReplayBuffer::loadState(StateReader& reader) {
+  const std::size_t n = reader.size<float>("values", capacity_ * stride_);
+  if (n % stride_ != 0) {
+    reader.refuse("values", "has " + std::to_string(n) + " values, which are no transitions of " +
+                                std::to_string(stride_));
   }
-  values_.assign(values.begin(), values.end());
+  const std::size_t size = n / stride_;
+  const bool full = size == capacity_;
+  const auto last = static_cast<std::int64_t>(full ? size - 1 : size);
+  next_ = static_cast<std::size_t>(reader.count("next", full ? 0 : last, last));
+  values_.resize(n);
   size_ = size;
-  next_ = next;
+  reader.array("values", values_);
 }
 
 }  // namespace pmeta

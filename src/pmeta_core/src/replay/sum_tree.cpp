@@ -1,6 +1,14 @@
 #include "pmeta_core/replay/sum_tree.h"
 
+#include <algorithm>
+
 namespace pmeta {
+namespace {
+
+// above any float; as many as there is memory for have a finite sum
+constexpr double kMostWeight = 1e39;
+
+}  // namespace
 
 SumTree::SumTree(std::size_t capacity) : capacity_(capacity) {
   while (leaves_ < capacity) leaves_ *= 2;
@@ -12,6 +20,23 @@ void SumTree::set(std::size_t leaf, double weight) {
   sums_[node] = weight;
   while (node > 1) {
     node /= 2;
+    sums_[node] = sums_[2 * node] + sums_[2 * node + 1];
+  }
+}
+
+void SumTree::saveState(StateWriter& writer, std::size_t count) const {
+  writer.array("weights", sums_.data() + leaves_, count);
+}
+
+void SumTree::loadState(StateReader& reader, std::size_t count) {
+  double* weights = sums_.data() + leaves_;
+  std::fill(sums_.begin(), sums_.end(), 0.0);
+  reader.array("weights", weights, count);
+  // false for what is not a number, too
+  const bool good = std::all_of(weights, weights + count,
+                                [](double weight) { return weight > 0 && weight <= kMostWeight; });
+  if (!good) reader.refuse("weights", "holds one that is no weight");
+  for (std::size_t node = leaves_ - 1; node > 0; --node) {
     sums_[node] = sums_[2 * node] + sums_[2 * node + 1];
   }
 }

@@ -34,7 +34,7 @@ RunConsole::RunConsole(const Experiment& experiment, bool terminal)
       adapted_(experiment.contextEpisodes().back()),
       terminal_(terminal),
       tasks_(experiment.totalTasks()),
-      cumulative_steps_(experiment.totalTasks(), 0) {
+      cumulative_steps_(experiment.totalTasks(), -1) {
   for (int task = 0; task < experiment.totalTasks(); ++task) {
     names_.push_back(experiment.family().taskName(task));
   }
@@ -59,6 +59,7 @@ void RunConsole::takeRows(const RoundBook::Round& round) {
       courses.meta.add(result.mean, result.round);
     }
     std::int64_t& before = cumulative_steps_.at(result.task);
+    if (before < 0) before = row.env_steps - result.env_steps;  // a run that goes on
     steps_ += row.env_steps - before;
     before = row.env_steps;
   }

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <tuple>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/personal/dqn_personal_learner.h"
@@ -96,6 +97,53 @@ Experiment Experiment::parse(const std::string& text, const std::string& source,
   return build(parseYaml(text, source), source, overrides);
 }
 
+Experiment Experiment::resume(const std::string& run_dir,
+                              const std::vector<std::string>& overrides) {
+  namespace fs = std::filesystem;
+  const fs::path dir = (fs::absolute(run_dir) / "").lexically_normal().parent_path();
+  const std::string config = (dir / "config.yaml").string();
+  if (!fs::exists(config)) {
+    throw Error("there is no run to resume in " + dir.string() + ": it has no config.yaml.");
+  }
+  // where the folder is now
+  const std::string place = "results_dir:=" + dir.parent_path().parent_path().string();
+  const Experiment saved = load(config, {place});
+  if (fs::path(saved.runDir()).lexically_normal() != dir) {
+    throw Error("the run folder " + dir.string() + " must be <results_dir>/" +
+                saved.settings().experiment + "/" + saved.settings().run_id +
+                ", as its config.yaml names it.");
+  }
+  std::vector<std::string> changed = overrides;
+  changed.push_back(place);
+  Experiment experiment = load(config, changed);
+  const std::string key = firstDifference(saved.definingSettings(), experiment.definingSettings());
+  if (!key.empty()) {
+    throw Error(key + " cannot be changed in a run that goes on: resume " + dir.string() +
+                " without it, or begin a new run.");
+  }
+  return experiment;
+}
+
+std::map<std::string, std::string> Experiment::definingSettings() const {
+  std::map<std::string, std::string> settings = flatSettings(YAML::Load(yaml_));
+  for (const char* key : {"results_dir", "pace", "publish_trajectories", "checkpoint.interval",
+                          "aggregation.round_timeout"}) {
+    settings.erase(key);
+  }
+  return settings;
+}
+
+std::string firstDifference(const std::map<std::string, std::string>& a,
+                            const std::map<std::string, std::string>& b) {
+  for (const auto& [one, other] : {std::tie(a, b), std::tie(b, a)}) {
+    for (const auto& [key, value] : one) {
+      const auto found = other.find(key);
+      if (found == other.end() || found->second != value) return key;
+    }
+  }
+  return "";
+}
+
 void Experiment::bind(Settings& s) {
   ExperimentSettings& e = settings_;
   s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
@@ -121,6 +169,10 @@ void Experiment::bind(Settings& s) {
   s.bind("fresh_episodes", e.fresh_episodes,
          "local runner: after the last round, evaluate the last and the best policies again, on so "
          "many fresh episodes a task",
+         Range::between(0, 1e6));
+
+  s.bind("checkpoint.interval", e.checkpoint_interval,
+         "rounds from one checkpoint of the whole run to the next; 0: none",
          Range::between(0, 1e6));
 
   s.bind("personal.alpha", e.personal.alpha, "personalised learning rate", Range::above(0));

@@ -63,6 +63,62 @@ std::vector<FreshReturn> FreshEvaluation::evaluate(const std::vector<TaskAgent>&
   return rows;
 }
 
+void FreshEvaluation::saveState(StateWriter& writer) const {
+  writer.part("last_personal", last_personal_);
+  writer.part("best_personal", best_personal_);
+  writer.part("last_meta", last_meta_);
+  writer.part("best_meta", best_meta_);
+  writer.count("own_best", static_cast<std::int64_t>(own_best_.size()));
+  for (std::size_t i = 0; i < own_best_.size(); ++i) {
+    writer.part("own_best_" + std::to_string(i), own_best_[i]);
+  }
+}
+
+void FreshEvaluation::loadState(StateReader& reader, const std::vector<TaskAgent>& agents) {
+  // models of the right layouts and owned entries, to be filled
+  std::vector<Model> personal;
+  for (const TaskAgent& agent : agents) {
+    if (agent.trains()) personal.push_back(agent.personal());
+  }
+  const std::vector<Model> meta = {Model(personal.front().layout)};
+  last_personal_ = load(reader, "last_personal", personal);
+  best_personal_ = load(reader, "best_personal", personal);
+  last_meta_ = load(reader, "last_meta", meta);
+  best_meta_ = load(reader, "best_meta", meta);
+  const auto n = static_cast<std::size_t>(
+      reader.count("own_best", 0, static_cast<std::int64_t>(personal.size())));
+  if (n != last_personal_.models.size()) reader.refuse("own_best", "is not one for each task");
+  own_best_.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    own_best_.push_back(load(reader, "own_best_" + std::to_string(i), {personal[i]}));
+  }
+}
+
+void FreshEvaluation::Kept::saveState(StateWriter& writer) const {
+  writer.count("round", round);
+  writer.value("value", value);
+  writer.count("models", static_cast<std::int64_t>(models.size()));
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    writer.part("model_" + std::to_string(i), models[i]);
+  }
+}
+
+// nothing kept, or as many models as `like`
+FreshEvaluation::Kept FreshEvaluation::load(StateReader& reader, const std::string& name,
+                                            const std::vector<Model>& like) {
+  const auto most = static_cast<std::int64_t>(like.size());
+  Kept kept;
+  kept.round = static_cast<int>(reader.count(name + "/round", 0, std::numeric_limits<int>::max()));
+  kept.value = reader.value<double>(name + "/value");
+  const std::int64_t n = reader.count(name + "/models", 0, most);
+  if (n != 0 && n != most) reader.refuse(name + "/models", "is not one for each task");
+  if (n != 0) kept.models = like;
+  for (std::size_t i = 0; i < kept.models.size(); ++i) {
+    reader.part(name + "/model_" + std::to_string(i), kept.models[i]);
+  }
+  return kept;
+}
+
 std::string FreshEvaluation::csv(const std::vector<FreshReturn>& rows) {
   std::string text =
       "snapshot,round,policy,trained_task,task,split,return_mean,return_std,episodes\n";

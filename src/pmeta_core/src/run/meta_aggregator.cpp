@@ -7,6 +7,7 @@ namespace pmeta {
 
 MetaAggregator::MetaAggregator(const Experiment& experiment)
     : beta_(experiment.settings().aggregation.beta),
+      rounds_(experiment.settings().rounds),
       quorum_(experiment.quorum()),
       updates_(experiment.numTasks()),
       counts_(experiment.numTasks()) {
@@ -87,6 +88,39 @@ std::vector<int> MetaAggregator::closeRound() {
   ++meta_.round;
   for (auto& update : updates_) update.reset();
   return absent;
+}
+
+void MetaAggregator::saveState(StateWriter& writer) const {
+  writer.count("round", meta_.round);
+  writer.part("meta", meta_.model);
+  std::vector<std::uint8_t> participants(updates_.size(), 0);
+  for (const int task : meta_.participants) participants[static_cast<std::size_t>(task)] = 1;
+  writer.array("participants", participants);
+  std::vector<std::int64_t> counts;
+  for (const Counts& c : counts_) {
+    counts.insert(counts.end(), {c.accepted, c.duplicate, c.stale, c.refused});
+  }
+  writer.array("counts", counts);
+  writer.count("refused_unknown", refused_unknown_);
+}
+
+void MetaAggregator::loadState(StateReader& reader) {
+  meta_.round = static_cast<int>(reader.count("round", 0, rounds_));
+  reader.part("meta", meta_.model);
+  std::vector<std::uint8_t> participants(updates_.size());
+  reader.array("participants", participants);
+  meta_.participants.clear();
+  for (std::size_t task = 0; task < participants.size(); ++task) {
+    if (participants[task] != 0) meta_.participants.push_back(static_cast<int>(task));
+  }
+  std::vector<std::int64_t> counts(4 * counts_.size());
+  reader.counts("counts", counts);
+  for (std::size_t task = 0; task < counts_.size(); ++task) {
+    const std::int64_t* c = &counts[4 * task];
+    counts_[task] = {c[0], c[1], c[2], c[3]};
+  }
+  refused_unknown_ = reader.count("refused_unknown");
+  for (auto& update : updates_) update.reset();
 }
 
 }  // namespace pmeta

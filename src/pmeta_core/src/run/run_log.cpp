@@ -1,8 +1,12 @@
 #include "pmeta_core/run/run_log.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <limits>
@@ -24,6 +28,30 @@ double meanReturn(const std::vector<RoundRow>& rows, Policy policy, Split split,
     ++n;
   }
   return n == 0 ? std::numeric_limits<double>::quiet_NaN() : sum / n;
+}
+
+// the whole lines of rounds 1 to `last`, with the header; `evaluated` is the last that has lines
+std::string firstRounds(const std::string& path, int last, int evaluated) {
+  std::ifstream file(path);
+  std::string line;
+  std::string kept;
+  int newest = 0;
+  std::getline(file, line);
+  if (!file || line != RunLog::csvHeader()) {
+    throw Error(path + " is not that of a run of this version: it cannot be resumed.");
+  }
+  kept = line + "\n";
+  while (std::getline(file, line) && !file.eof()) {
+    const int round = std::atoi(line.c_str());
+    if (round < 1 || round > last) break;
+    newest = round;
+    kept += line + "\n";
+  }
+  if (newest != evaluated) {
+    throw Error(path + " ends with round " + std::to_string(newest) + " but the checkpoint knows " +
+                std::to_string(evaluated) + " rounds: the run cannot be resumed.");
+  }
+  return kept;
 }
 
 }  // namespace
@@ -151,8 +179,54 @@ std::vector<int> RoundBook::awaited() const {
   return tasks;
 }
 
-RunLog::RunLog(const Experiment& experiment)
-    : experiment_(experiment), dir_(experiment.runDir()), started_(utcTime()) {
+void RoundBook::saveState(StateWriter& writer) const {
+  writer.count("rounds_taken", roundsTaken());
+  writer.array("env_steps", env_steps_);
+  writer.array("updates", updates_);
+  writer.value("seconds", seconds_);
+  std::int64_t closed = 0;
+  std::int64_t returns = 0;
+  for (const auto& [round, open] : open_) {
+    if (open.closed) writer.part("closed_" + std::to_string(closed++), open.summary);
+    for (const auto& entry : open.results) {
+      writer.part("return_" + std::to_string(returns++), entry.second);
+    }
+  }
+  writer.count("closed", closed);
+  writer.count("returns", returns);
+}
+
+void RoundBook::loadState(StateReader& reader) {
+  open_.clear();
+  next_ = static_cast<int>(reader.count("rounds_taken", 0, rounds_)) + 1;
+  reader.counts("env_steps", env_steps_);
+  reader.counts("updates", updates_);
+  seconds_ = reader.value<double>("seconds");
+  const std::int64_t closed = reader.count("closed", 0, rounds_);
+  for (std::int64_t k = 0; k < closed; ++k) {
+    RoundSummary summary;
+    reader.part("closed_" + std::to_string(k), summary);
+    const auto known = [&](const std::vector<int>& tasks) {
+      return tasks.empty() || tasks.back() < num_tasks_;  // ascending
+    };
+    if (summary.round < next_ || summary.round > rounds_ || !known(summary.participants) ||
+        !known(summary.missing)) {
+      reader.refuse("closed_" + std::to_string(k), "is no open round of this run");
+    }
+    closeRound(summary.round, summary.participants, summary.missing, summary.seconds);
+  }
+  const std::int64_t returns = reader.count("returns");
+  for (std::int64_t k = 0; k < returns; ++k) {
+    TaskReturn result;
+    reader.part("return_" + std::to_string(k), result);
+    result.run_id = run_id_;
+    if (!add(result)) {
+      reader.refuse("return_" + std::to_string(k), "is none that this run still waits for");
+    }
+  }
+}
+
+RunLog::RunLog(const Experiment& experiment) : RunLog(experiment, utcTime(), 0) {
   requireWritable(experiment.settings().results_dir);
   if (std::filesystem::exists(dir_ + "/manifest.json")) {
     throw Error("the run folder " + dir_ + " already holds a run: choose another run_id.");
@@ -160,8 +234,42 @@ RunLog::RunLog(const Experiment& experiment)
   requireWritable(dir_);
   writeFileAtomically(dir_ + "/config.yaml", experiment.yaml());
   writeManifest("running");
-  csv_.open(dir_ + "/rounds.csv");
-  csv_ << csvHeader() << "\n" << std::flush;
+  writeFileAtomically(dir_ + "/rounds.csv", std::string(csvHeader()) + "\n");
+  openCsv();
+}
+
+RunLog::RunLog(const Experiment& experiment, const std::string& started, int rounds_done)
+    : experiment_(experiment),
+      dir_(experiment.runDir()),
+      started_(started),
+      rounds_done_(rounds_done) {}
+
+RunLog RunLog::reopen(const Experiment& experiment, int rounds_done) {
+  const std::string dir = experiment.runDir();
+  requireResumable(dir);
+  std::ifstream file(dir + "/manifest.json");
+  const auto manifest = nlohmann::json::parse(file, nullptr, false);
+  const bool dated = manifest.contains("started") && manifest["started"].is_string();
+  RunLog log(experiment, dated ? manifest["started"].get<std::string>() : utcTime(), rounds_done);
+  requireWritable(dir);
+  const EvaluationSchedule evaluations = experiment.evaluationSchedule();
+  int evaluated = rounds_done;
+  while (evaluated > 0 && !evaluations.includes(evaluated)) --evaluated;
+  writeFileAtomically(dir + "/rounds.csv",
+                      firstRounds(dir + "/rounds.csv", rounds_done, evaluated));
+  log.writeManifest("running");
+  log.openCsv();
+  return log;
+}
+
+void RunLog::openCsv() { csv_.open(dir_ + "/rounds.csv", std::ios::app); }
+
+void RunLog::sync() {
+  const int file = ::open((dir_ + "/rounds.csv").c_str(), O_WRONLY | O_CLOEXEC);
+  const bool synced = file >= 0 && ::fsync(file) == 0;
+  const std::string why = std::strerror(errno);
+  if (file >= 0) ::close(file);
+  if (!synced) throw Error("cannot write " + dir_ + "/rounds.csv (" + why + ").");
 }
 
 void RunLog::write(const RoundBook::Round& round) {
@@ -226,6 +334,16 @@ std::string runStatus(const std::string& run_dir) {
     return "";
   }
   return manifest["status"];
+}
+
+void requireResumable(const std::string& run_dir) {
+  const std::string status = runStatus(run_dir);
+  if (status.empty()) {
+    throw Error("there is no run to resume in " + run_dir + ": it has no manifest.json.");
+  }
+  if (status == "finished") {
+    throw Error("the run in " + run_dir + " is finished: there is nothing to resume.");
+  }
 }
 
 void writeFileAtomically(const std::string& path, const std::string& text) {

@@ -92,23 +92,9 @@ std::string identity(const std::string& yaml) {
   return kept;
 }
 
-// effective settings by full key
-void flatten(const YAML::Node& map, const std::string& prefix,
-             std::map<std::string, std::string>& values) {
-  for (const auto& item : map) {
-    const std::string key = prefix + item.first.Scalar();
-    if (item.second.IsMap()) {
-      flatten(item.second, key + ".", values);
-    } else {
-      values[key] = YAML::Dump(item.second);
-    }
-  }
-}
-
 // a folder name out of the settings that vary: "algorithm_pmeta-lambda_5-seed_0"
 std::string nameRun(const Experiment& experiment, const std::vector<Axis>& axes) {
-  std::map<std::string, std::string> values;
-  flatten(YAML::Load(experiment.yaml()), "", values);
+  const std::map<std::string, std::string> values = flatSettings(YAML::Load(experiment.yaml()));
   std::string name;
   for (const Axis& axis : axes) {
     if (axis.values.size() < 2) continue;
@@ -158,6 +144,7 @@ std::vector<Experiment> planSweep(const SweepPlan& plan) {
     std::vector<std::string> placed = assignments;
     placed.push_back("results_dir:=" + base.settings().results_dir + "/sweeps/" + plan.name);
     placed.push_back("run_id:=" + nameRun(base, axes));
+    placed.push_back("checkpoint.interval:=0");  // a run that was cut off begins anew
     runs.push_back(Experiment::load(plan.config, placed));
   }
   return runs;

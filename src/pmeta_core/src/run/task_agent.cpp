@@ -22,6 +22,7 @@ class Stopwatch {
 
 // of the last round's log weight, what stays in this one's
 constexpr double kWeightMemory = 0.8;
+constexpr double kMostLogWeight = 100;  // catch_up / (1 - kWeightMemory) is at most 50
 
 }  // namespace
 
@@ -43,9 +44,11 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   checkModel(meta.model, learner_->layout(), "the aggregator");
   const Stopwatch watch;
   const int round = meta.round + 1;
+  if (between_ && round_ > 0 && round == round_) return lastResult();
   Rng rng(seed_, task_, Stream::kSample, round);
 
   RoundResult result;
+  between_ = false;
   learner_->beginRound(meta.model, keeps_personal_);
   for (int r = 1; r <= updates_per_round_; ++r) {
     const UpdateStats stats = learner_->update(rng);
@@ -68,7 +71,15 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
     adjustWeight(personal.mean);
     result.personal = std::move(personal);
   }
-  result.update = {run_id_, task_, round,
+  last_ = std::move(result);
+  round_ = round;
+  between_ = true;
+  return lastResult();
+}
+
+TaskAgent::RoundResult TaskAgent::lastResult() const {
+  RoundResult result = last_;
+  result.update = {run_id_, task_, round_,
                    sends_personal_ ? learner_->personal() : learner_->auxiliary(),
                    std::exp(log_weight_)};
   return result;
@@ -105,6 +116,61 @@ ReturnStats TaskAgent::evaluateFresh(Policy kind, const Model& policy, int episo
   }
   total.std = std::sqrt(std::max(0.0, mean_of_squares - total.mean * total.mean));
   return total;
+}
+
+void TaskAgent::saveState(StateWriter& writer) const {
+  if (!trains()) throw Error("task " + std::to_string(task_) + " is a test task: it has no state.");
+  if (!between_) {
+    throw Error("task " + std::to_string(task_) +
+                " was stopped in the middle of a round: its state can be saved after a whole one.");
+  }
+  writer.count("round", round_);
+  writer.count("env_steps", env_steps_);
+  writer.count("updates", updates_);
+  writer.value("log_weight", log_weight_);
+  writer.flag("has_meta_return", meta_return_.has_value());
+  writer.value("meta_return", meta_return_.value_or(0));
+  writer.part("last", last_);
+  writer.part("learner", *learner_);
+}
+
+void TaskAgent::loadState(StateReader& reader) {
+  if (!trains()) throw Error("task " + std::to_string(task_) + " is a test task: it has no state.");
+  round_ = static_cast<int>(reader.count("round", 0, evaluations_.rounds));
+  env_steps_ = reader.count("env_steps");
+  updates_ = reader.count("updates");
+  log_weight_ = reader.finite("log_weight");
+  if (std::abs(log_weight_) > kMostLogWeight) reader.refuse("log_weight", "is out of its range");
+  const auto meta_return = reader.value<double>("meta_return");
+  meta_return_.reset();
+  if (reader.flag("has_meta_return")) meta_return_ = meta_return;
+  reader.part("last", last_);
+  if (last_.personal) {
+    if (last_.personal->task != task_ || last_.personal->round != round_) {
+      reader.refuse("last/personal", "is of another task or round");
+    }
+    last_.personal->run_id = run_id_;
+  }
+  reader.part("learner", *learner_);
+  between_ = true;
+}
+
+void TaskAgent::RoundResult::saveState(StateWriter& writer) const {
+  writer.count("env_steps", env_steps);
+  writer.count("updates", updates);
+  writer.value("loss", loss);
+  writer.value("distance", distance);
+  writer.flag("evaluated", personal.has_value());
+  if (personal) writer.part("personal", *personal);
+}
+
+void TaskAgent::RoundResult::loadState(StateReader& reader) {
+  env_steps = reader.count("env_steps");
+  updates = reader.count("updates");
+  loss = reader.value<double>("loss");
+  distance = reader.value<double>("distance");
+  personal.reset();
+  if (reader.flag("evaluated")) reader.part("personal", personal.emplace());
 }
 
 Episode TaskAgent::recordPersonal() const {

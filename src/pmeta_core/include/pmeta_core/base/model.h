@@ -6,6 +6,8 @@
 #include <variant>
 #include <vector>
 
+#include "pmeta_core/base/state.h"
+
 namespace pmeta {
 
 /// One named tensor of a model, in row-major order.
@@ -76,6 +78,11 @@ struct Model {
   std::uint32_t checksum() const;
 
   bool operator==(const Model& other) const;
+
+  /// The values alone: layout and presence follow from the settings. Loading writes them in place
+  /// and refuses a present one that is not finite.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 };
 
 /// Throws Error unless `model` has the layout `expected`, matching sizes and finite values wherever

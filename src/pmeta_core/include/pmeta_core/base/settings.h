@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -100,6 +101,9 @@ YAML::Node loadYamlFile(const std::string& path);
 
 /// Parses YAML text that must be a map; `source` names it in errors.
 YAML::Node parseYaml(const std::string& text, const std::string& source);
+
+/// A map of (nested) settings by full key; each value as YAML text.
+std::map<std::string, std::string> flatSettings(const YAML::Node& map);
 
 /// The candidate closest to `word` by edit distance, or "" if none is close.
 std::string nearest(const std::string& word, const std::vector<std::string>& candidates);

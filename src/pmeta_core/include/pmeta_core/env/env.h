@@ -8,6 +8,7 @@
 
 #include "pmeta_core/base/rng.h"
 #include "pmeta_core/base/settings.h"
+#include "pmeta_core/base/state.h"
 
 namespace pmeta {
 
@@ -55,6 +56,10 @@ class Env {
 
   /// Goes on from a state() of the same task. Throws Error if `state` cannot be one.
   virtual void setState(const std::vector<double>& state);
+
+  /// state() and setState(); loading refuses an episode that is over.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 };
 
 /// Throws Error unless `state` holds `size` finite numbers of which the last counts steps; for

@@ -87,17 +87,17 @@ class DqnLearner {
   std::int64_t updates() const { return updates_; }  ///< calls of update() so far
   double epsilon() const { return epsilon_.at(updates_); }
   const PrioritisedReplay& replay() const { return replay_; }
-  /// Parameters of the K target networks, one after the other; copies go to slot newestTarget()
-  /// + 1.
-  const AlignedFloats& targets() const { return targets_; }
-  int newestTarget() const { return newest_target_; }
+  const AlignedFloats& targets() const { return targets_; }  ///< of the K networks, one by one
   const std::vector<std::unique_ptr<Env>>& envs() const { return envs_; }
-  const NStepAccumulator& nStep() const { return n_step_; }
-  const std::vector<float>& observations() const { return observations_; }  ///< of each environment
+
+  /// All but parameters and optimiser: replay, targets, environments in mid-episode, counters.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 
  private:
   std::int64_t stepAll(const float* parameters, double epsilon, Rng& rng);
   void computeTargets(const float* parameters);
+  bool isAction(float action) const;
   double computeOutputGradient(const float* q_values);
   float* target(int k) { return targets_.data() + static_cast<std::size_t>(k) * network_.size(); }
 

@@ -26,21 +26,6 @@ struct SacLosses {
   double kl = 0;           ///< KL(q(z|c) || N(0, I)); 0 without an encoder
 };
 
-/// All that SacLearner's future depends on besides settings, parameters, optimiser and generator.
-struct SacState {
-  std::vector<float> replay, context;  ///< ReplayBuffer::values()
-  std::size_t replay_next = 0, context_next = 0;
-  AlignedFloats targets;
-  Temperature::State temperature;
-  std::int64_t updates = 0;
-  std::int64_t episodes = 0;
-  bool started = false;
-  bool prior_episode = true;
-  std::vector<double> env_state;  ///< empty before the start
-  std::vector<float> observation;
-  std::vector<float> task_input;
-};
-
 /// Soft actor-critic on one task with continuous actions in [-1, 1] (Haarnoja et al., "Soft
 /// Actor-Critic Algorithms and Applications", 2018), with PEARL's inference network if wanted
 /// (Rakelly et al., 2019): environment, replay, context, target critics and temperature.
@@ -89,10 +74,10 @@ class SacLearner {
   std::int64_t updates() const { return updates_; }         ///< calls of update() so far
   const Env& env() const { return *env_; }
 
-  /// For checkpoints. Throws Error where the environment cannot hand out its state.
-  SacState state() const;
-  /// Goes on from a state() of the same settings and task. Throws Error if it cannot be one.
-  void restore(const SacState& state);
+  /// All but parameters and optimiser: replay, context, targets, temperature, the environment in
+  /// mid-episode, counters.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 
  private:
   void beginEpisode(const float* parameters, bool warm_up, Rng& rng);

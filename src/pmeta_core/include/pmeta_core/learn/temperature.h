@@ -4,6 +4,7 @@
 #include <string>
 
 #include "pmeta_core/base/settings.h"
+#include "pmeta_core/base/state.h"
 
 namespace pmeta {
 
@@ -26,14 +27,6 @@ void bind(Settings& settings, const std::string& prefix, TemperatureSettings& te
 /// Actor-Critic Algorithms and Applications", 2018, eq. 18, by log alpha).
 class Temperature {
  public:
-  /// All that the next update depends on.
-  struct State {
-    double log_value = 0;
-    double first_moment = 0;
-    double second_moment = 0;
-    std::int64_t updates = 0;
-  };
-
   Temperature(const TemperatureSettings& settings, int action_size);
 
   double value() const;  ///< alpha
@@ -45,14 +38,17 @@ class Temperature {
   /// One step of Adam, given the mean of log pi over a batch; nothing where alpha is fixed.
   void update(double mean_log_prob);
 
-  const State& state() const { return state_; }
-  void restore(const State& state) { state_ = state; }
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 
  private:
   bool automatic_;
   double target_entropy_;
   double learning_rate_;
-  State state_;
+  double log_value_;
+  double first_moment_ = 0;
+  double second_moment_ = 0;
+  std::int64_t updates_ = 0;
 };
 
 }  // namespace pmeta

@@ -38,6 +38,8 @@ class DqnPersonalLearner : public PersonalLearner {
   /// it the same seed to compare policies.
   ReturnStats evaluate(const Model& policy, Rng& rng) const override;
   Episode record(const Model& policy, Rng& rng) const override;
+  void saveState(StateWriter& writer) const override;
+  void loadState(StateReader& reader) override;
 
   const DqnLearner& learner() const { return learner_; }
   const ProximalAdam& optimizer() const { return optimizer_; }

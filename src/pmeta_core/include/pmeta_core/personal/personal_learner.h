@@ -77,6 +77,12 @@ class PersonalLearner {
 
   /// One greedy episode of `policy` from a start drawn by `rng`.
   virtual Episode record(const Model& policy, Rng& rng) const = 0;
+
+  /// All that later rounds depend on, between two updates: parameters, optimiser, replay, target
+  /// networks, environments. Loaded by a learner of the same settings and task, it goes on bit for
+  /// bit as this one.
+  virtual void saveState(StateWriter& writer) const = 0;
+  virtual void loadState(StateReader& reader) = 0;
 };
 
 }  // namespace pmeta

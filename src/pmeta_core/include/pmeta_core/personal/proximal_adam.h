@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "pmeta_core/base/state.h"
 #include "pmeta_core/learn/optimizer.h"
 #include "pmeta_core/nn/aligned.h"
 
@@ -52,13 +53,15 @@ class ProximalAdam : public Optimizer<float> {
   const ProximalAdamSettings& settings() const { return settings_; }
   std::size_t size() const { return first_moment_.size(); }
 
-  /// Adam's state, for checkpoints.
-  std::uint64_t updates() const { return updates_; }
   const AlignedFloats& firstMoment() const { return first_moment_; }
   const AlignedFloats& secondMoment() const { return second_moment_; }
-  /// Takes a state back. Throws Error if the moments are not size() floats each.
-  void restore(std::uint64_t updates, const AlignedFloats& first_moment,
-               const AlignedFloats& second_moment);
+
+  /// As if no update had been made.
+  void reset();
+
+  /// Adam's moments and count.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 
  private:
   // in one update each parameter has its turn once
@@ -76,7 +79,7 @@ class ProximalAdam : public Optimizer<float> {
   float* auxiliary_;
   ProximalAdamSettings settings_;
   std::vector<Range> ranges_;  // with a strength of their own
-  std::uint64_t updates_ = 0;
+  std::int64_t updates_ = 0;
   AlignedFloats first_moment_, second_moment_;
 };
 

@@ -49,6 +49,8 @@ class SacPersonalLearner : public PersonalLearner {
   ReturnStats evaluate(const Model& policy, Rng& rng) const override;
   std::vector<float> taskInput(const Model& policy) const override;
   Episode record(const Model& policy, Rng& rng) const override;
+  void saveState(StateWriter& writer) const override;
+  void loadState(StateReader& reader) override;
 
   /// Returns of `policy` as at test time: it knows nothing of this learner's context but explores
   /// by itself, if it has an encoder. Evaluations start alike.

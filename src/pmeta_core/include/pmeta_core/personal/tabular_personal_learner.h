@@ -35,6 +35,8 @@ class TabularPersonalLearner : public PersonalLearner {
   const Model& auxiliary() const override { return auxiliary_; }
   ReturnStats evaluate(const Model& policy, Rng& rng) const override;
   Episode record(const Model& policy, Rng& rng) const override;
+  void saveState(StateWriter& writer) const override;
+  void loadState(StateReader& reader) override;
 
  private:
   std::unique_ptr<TabularEnv> env_;

@@ -23,6 +23,9 @@ class NStepAccumulator {
     std::vector<float> observations;  ///< n x observation_size
     std::vector<float> actions;       ///< n x action_size
     std::vector<double> returns;      ///< n: rewards so far, discounted
+
+    void saveState(StateWriter& writer) const;
+    void loadState(StateReader& reader);
   };
 
   /// n: at least 1. gamma: in [0, 1].
@@ -34,6 +37,9 @@ class NStepAccumulator {
   /// the oldest first.
   void add(int env, const float* observation, const float* action, const Step& step,
            const float* next_observation, PrioritisedReplay& replay);
+
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 
   const std::vector<Queue>& queues() const { return queues_; }  ///< by environment
 

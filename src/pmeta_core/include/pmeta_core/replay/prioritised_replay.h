@@ -40,6 +40,9 @@ class PrioritisedReplay {
   /// Sets p_i = |td_errors[b]| + 1e-6 for each sample b of `batch`.
   void setPriorities(const ReplayBatch& batch, const float* td_errors);
 
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
+
   std::size_t size() const { return buffer_.size(); }
   const ReplayBuffer& buffer() const { return buffer_; }
   const SumTree& tree() const { return tree_; }  ///< p_i^alpha by slot

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "pmeta_core/base/state.h"
+
 namespace pmeta {
 
 /// A view of one stored transition; valid until the next add().
@@ -39,8 +41,9 @@ class ReplayBuffer {
   /// All transitions as they lie in memory, slot by slot: s_t, a_t, R_n, discount, s_{t+n}.
   const std::vector<float>& values() const { return values_; }
 
-  /// Takes back what values() and next() gave. Throws Error if it does not fit this buffer.
-  void restore(const std::vector<float>& values, std::size_t next);
+  /// Straight from and to its memory: no second copy is made.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 
  private:
   std::size_t capacity_;

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "pmeta_core/base/state.h"
+
 namespace pmeta {
 
 /// Weights with their running sums in a binary tree: a weight is set, and a prefix sum searched, in
@@ -20,6 +22,11 @@ class SumTree {
 
   /// weight: finite, at least 0.
   void set(std::size_t leaf, double weight);
+
+  /// The weights of the first `count` leaves; loading refuses any that is not positive, or is
+  /// beyond what a float can make of a TD error. All other leaves are 0.
+  void saveState(StateWriter& writer, std::size_t count) const;
+  void loadState(StateReader& reader, std::size_t count);
 
   /// The leaf whose weight covers `prefix` in [0, total()): the sums before it are at most
   /// `prefix`, the sums up to and with it above. Never a leaf of weight 0 unless all are.

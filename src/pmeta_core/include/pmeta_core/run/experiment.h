@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -46,7 +47,8 @@ struct ExperimentSettings {
   std::string run_id;           ///< "" means one made of the start time, algorithm and seed
   double pace = 0;              ///< least seconds between rounds, to watch a fast experiment
   bool publish_trajectories = true;
-  int fresh_episodes = 0;  ///< local runner: episodes of the evaluation after the last round
+  int checkpoint_interval = 0;  ///< rounds from one checkpoint to the next; 0: none
+  int fresh_episodes = 0;       ///< local runner: episodes of the evaluation after the last round
   PersonalSettings personal;
   QLearningSettings q_learning;  ///< with learner q_learning
   DqnSettings dqn;               ///< with learner dqn
@@ -76,6 +78,12 @@ class Experiment {
   static Experiment parse(const std::string& text, const std::string& source,
                           const std::vector<std::string>& overrides = {});
 
+  /// The experiment of a run folder, by its config.yaml; the folder may have been moved.
+  /// `overrides` may set what does not define the run (see definingSettings()). Throws Error if
+  /// there is no run there, or on an override of anything else, which it names.
+  static Experiment resume(const std::string& run_dir,
+                           const std::vector<std::string>& overrides = {});
+
   const ExperimentSettings& settings() const { return settings_; }
   const EnvFamily& family() const { return *family_; }
   int numTasks() const { return family_->numTasks(); }  ///< that are trained on
@@ -102,6 +110,11 @@ class Experiment {
   /// The best return any policy can have on the task, where it can be computed (tabular tasks).
   std::optional<double> optimalReturn(int task) const;
 
+  /// Is a checkpoint due after this round?
+  bool checkpointsAfter(int round) const {
+    return settings_.checkpoint_interval > 0 && round % settings_.checkpoint_interval == 0;
+  }
+
   /// <results_dir>/<experiment>/<run_id>
   std::string runDir() const;
 
@@ -109,6 +122,9 @@ class Experiment {
   const std::string& yaml() const { return yaml_; }
   /// The same as a table for people.
   const std::string& table() const { return table_; }
+  /// Those of the effective settings that decide what a run learns, by full key: all but
+  /// results_dir, checkpoint.*, pace, publish_trajectories and aggregation.round_timeout.
+  std::map<std::string, std::string> definingSettings() const;
   /// All keys with meanings, for --help.
   static std::string describe(const std::string& environment, const std::string& learner);
   /// Notes and warnings about the settings, one sentence each.
@@ -129,6 +145,10 @@ class Experiment {
   std::string table_;
   std::vector<std::string> notes_;
 };
+
+/// The first key that only one of both has, or has with another value; "" if they are equal.
+std::string firstDifference(const std::map<std::string, std::string>& a,
+                            const std::map<std::string, std::string>& b);
 
 /// "~" and "" expanded: where results go by default, see ExperimentSettings::results_dir.
 std::string expandResultsDir(const std::string& results_dir);

@@ -39,6 +39,10 @@ class FreshEvaluation {
   std::vector<FreshReturn> evaluate(const std::vector<TaskAgent>& agents, int episodes,
                                     bool cross) const;
 
+  /// The policies kept so far. Loading needs the agents, in the same order.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader, const std::vector<TaskAgent>& agents);
+
   /// The rows as CSV, with a header.
   static std::string csv(const std::vector<FreshReturn>& rows);
 
@@ -47,7 +51,10 @@ class FreshEvaluation {
     int round = 0;
     double value = -std::numeric_limits<double>::infinity();
     std::vector<Model> models;
+
+    void saveState(StateWriter& writer) const;
   };
+  static Kept load(StateReader& reader, const std::string& name, const std::vector<Model>& like);
   Kept last_personal_, best_personal_, last_meta_, best_meta_;
   std::vector<Kept> own_best_;  ///< by training task
 };

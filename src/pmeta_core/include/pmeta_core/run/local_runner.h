@@ -24,9 +24,23 @@ struct LocalResult {
 using OnRound = std::function<bool(const RoundBook::Round&)>;
 
 /// Runs the whole experiment in this process and thread, with the very classes the nodes use and
-/// the same result bit for bit. Files are written if `log` is given: those of RunLog, and the last
-/// policies below policies/, a stopped run's too.
+/// the same result bit for bit. Files are written if `log` is given: those of RunLog, checkpoints
+/// where settings ask for them, and the last policies below policies/, a stopped run's too.
+///
+/// With `resumed_round`, from findResumePoint(), the run goes on from that round's checkpoints; the
+/// rounds before are then missing from the result. `log` must be that of RunLog::reopen().
 LocalResult runLocally(const Experiment& experiment, RunLog* log = nullptr,
-                       const OnRound& on_round = {});
+                       const OnRound& on_round = {}, int resumed_round = 0);
+
+/// Where a run in this experiment's folder can go on.
+struct ResumePoint {
+  int round = 0;                     ///< of the checkpoints
+  int rounds_done = 0;               ///< rounds whose record is complete, for RunLog::reopen()
+  std::vector<std::string> refused;  ///< newer checkpoints that are not good, one sentence each
+};
+
+/// The newest round of which the aggregator and every agent have a good checkpoint. Throws Error if
+/// there is none, or the run is finished.
+ResumePoint findResumePoint(const Experiment& experiment);
 
 }  // namespace pmeta

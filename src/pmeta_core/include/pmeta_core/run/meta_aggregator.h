@@ -48,6 +48,11 @@ class MetaAggregator {
   /// Returns the tasks that were missing. Needs at least one update.
   std::vector<int> closeRound();
 
+  /// Meta-policy, round, participants and counts; what has been reported for the open round is left
+  /// out: agents send it again.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
+
   const std::vector<Counts>& counts() const { return counts_; }     ///< by task
   std::int64_t refusedUnknown() const { return refused_unknown_; }  ///< from tasks not of this run
 
@@ -55,6 +60,7 @@ class MetaAggregator {
   std::string refusal(const AuxiliaryUpdate& update) const;
 
   double beta_;
+  int rounds_;
   int quorum_;
   MetaPolicy meta_;
   std::vector<std::shared_ptr<const AuxiliaryUpdate>> updates_;  ///< by task; null: missing

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pmeta_core/base/model.h"
+#include "pmeta_core/base/state.h"
 
 namespace pmeta {
 
@@ -47,6 +48,10 @@ struct TaskReturn {
   std::int64_t env_steps = 0;  ///< training transitions of this round; 0 for the meta-policy
   std::int64_t updates = 0;    ///< personalised updates of this round; 0 for the meta-policy
   double seconds = 0;          ///< wall time of this round's training and evaluation
+
+  /// All but run_id, which whoever loads it knows.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 };
 
 /// One round as the aggregator saw it.
@@ -61,6 +66,10 @@ struct RoundSummary {
   std::vector<int> missing;  ///< tasks whose update this round did without
   double seconds = 0;        ///< from the meta-policy's publication to the aggregation
   double eta_seconds = 0;    ///< estimate until the last round
+
+  /// What is known when the round closes: round, participants, missing and seconds.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
 };
 
 }  // namespace pmeta

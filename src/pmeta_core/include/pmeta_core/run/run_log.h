@@ -44,6 +44,11 @@ class RoundBook {
   std::vector<Round> take(bool force = false);
 
   int roundsTaken() const { return next_ - 1; }
+
+  /// Rounds that are open, with the returns in hand, and the counters of those given out.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
+
   /// Has every training task's personal return of `round` arrived?
   bool hasPersonal(int round) const;
   /// Tasks whose returns the oldest open round still waits for.
@@ -81,8 +86,16 @@ class RunLog {
   /// Creates the folder; throws Error if it holds a run already or cannot be written.
   explicit RunLog(const Experiment& experiment);
 
+  /// Goes on in the folder of an unfinished run: rounds.csv is cut back to `rounds_done` rounds,
+  /// also a line that was cut off, and the manifest says "running" again. Throws Error if the run
+  /// is finished, or its files are not there.
+  static RunLog reopen(const Experiment& experiment, int rounds_done);
+
   /// Appends the round's rows and flushes them to disk.
   void write(const RoundBook::Round& round);
+
+  /// Waits until what has been written is on the disk.
+  void sync();
 
   /// Sets the manifest's status: "finished", "stopped" or "failed".
   void finish(const std::string& status);
@@ -93,6 +106,8 @@ class RunLog {
   static std::string csvLine(const RoundRow& row);
 
  private:
+  RunLog(const Experiment& experiment, const std::string& started, int rounds_done);
+  void openCsv();
   void writeManifest(const std::string& status);
 
   Experiment experiment_;
@@ -105,6 +120,9 @@ class RunLog {
 /// Status in a run folder's manifest.json: "running", "finished", "stopped", "failed", or "" if
 /// none.
 std::string runStatus(const std::string& run_dir);
+
+/// Throws Error unless the folder holds a run that is not finished.
+void requireResumable(const std::string& run_dir);
 
 /// Writes a whole file under a temporary name, then renames it: never half a file. Throws Error.
 void writeFileAtomically(const std::string& path, const std::string& text);

@@ -22,6 +22,10 @@ class TaskAgent {
     std::int64_t updates = 0;            ///< of this round
     double loss = 0;                     ///< of the last update
     double distance = 0;                 ///< ||phi - omega_meta|| over the task's own entries
+
+    /// All but the update, which follows from the agent's state.
+    void saveState(StateWriter& writer) const;
+    void loadState(StateReader& reader);
   };
 
   /// Called after each update with the number done in this round; false stops training.
@@ -36,6 +40,10 @@ class TaskAgent {
   /// One round from `meta`: reset, R updates, and evaluation of the personal policy where
   /// Experiment::evaluationSchedule() has it. Nothing if stopped. Throws Error if the meta-policy
   /// does not fit.
+  ///
+  /// The round trained last is not trained again: asked for it once more, also after loadState(),
+  /// it gives the same result. So an agent that ended between saving and sending sends what it
+  /// owes.
   std::optional<RoundResult> trainRound(const MetaPolicy& meta, const KeepGoing& keep_going = {});
 
   /// The meta-policy on this task: one return for each of Experiment::contextEpisodes(), or none
@@ -50,11 +58,21 @@ class TaskAgent {
   /// What tells the personal policy its task beside the observations; empty if nothing does.
   std::vector<float> taskInput() const { return learner_->taskInput(learner_->personal()); }
 
+  /// The round trained last; 0 before the first.
+  int round() const { return round_; }
+
+  /// All that its later rounds depend on: of the learner, counters, weight, and the last result. To
+  /// be called between two rounds, where no generator is alive; throws Error after a round that was
+  /// stopped, or for a test task, which has no state.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
+
   /// One greedy episode, from the same start whatever the policy and round.
   Episode recordPersonal() const;
   Episode recordMeta(const MetaPolicy& meta) const;
 
  private:
+  RoundResult lastResult() const;
   void adjustWeight(double personal_return);
   Rng evaluationRng() const;
   TaskReturn makeReturn(int round, Policy policy, const ReturnStats& stats) const;
@@ -67,6 +85,9 @@ class TaskAgent {
   bool keeps_personal_;
   bool sends_personal_;
   EvaluationSchedule evaluations_;
+  int round_ = 0;               // trained last
+  RoundResult last_;            // of that round, without the model, which the learner has
+  bool between_ = true;         // no round has been left in its middle
   std::int64_t env_steps_ = 0;  // since the last evaluation
   std::int64_t updates_ = 0;
   double catch_up_;

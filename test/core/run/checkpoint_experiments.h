@@ -1,0 +1,55 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "../support.h"
+
+namespace pmeta::test {
+
+/// Small experiments of each learner, with what a checkpoint could forget.
+inline std::string checkpointYaml(const std::string& kind) {
+  const std::string head = "experiment: " + kind +
+                           "\nrun_id: run\nrounds: 6\nupdates_per_round: 12\n"
+                           "evaluation_interval: 2\ncheckpoint: {interval: 1}\n"
+                           "aggregation: {catch_up: 0.5}\n";
+  if (kind == "table") {
+    return head +
+           "personal: {personal_init: keep}\n"
+           "environment: {name: gridworld, sizes: [3, 4], slip: 0.1}\n";
+  }
+  if (kind == "dqn") {
+    return head +
+           "learner: dqn\n"
+           "dqn: {hidden: [6, 5], batch_size: 8, buffer_size: 150, n_step: 4, num_envs: 3, "
+           "warm_up_steps: 10, target_update_interval: 7, averaged_targets: 3, "
+           "evaluation_episodes: 2, dueling: true}\n"
+           "environment: {name: cart_pole, force_mag: [10, 20], masspole: [0.1], length: [0.5]}\n";
+  }
+  const std::string sac =
+      "learner: sac\nfresh_episodes: 3\n"
+      "sac: {hidden: [8, 6], batch_size: 8, buffer_size: 90, warm_up_steps: 25, "
+      "evaluation_episodes: 2, ";
+  if (kind == "sac_one_hot") {
+    return head + sac +
+           "task_encoding: one_hot}\n"
+           "environment: {name: half_cheetah_dir, horizon: 15}\n";
+  }
+  return head + sac +
+         "task_encoding: inference, context_hidden: [6], latent_size: 2, context_batch: 6, "
+         "context_buffer: 40, exploration_episodes: [1, 2]}\n"
+         "environment: {name: sparse_point_robot, train_tasks: 2, test_tasks: 1, horizon: 10}\n";
+}
+
+inline const std::vector<std::string>& checkpointKinds() {
+  static const std::vector<std::string> kinds = {"table", "dqn", "sac_one_hot", "sac_context"};
+  return kinds;
+}
+
+inline Experiment checkpointExperiment(const std::string& kind, const std::string& results_dir,
+                                       std::vector<std::string> overrides = {}) {
+  overrides.push_back("results_dir:=" + results_dir);
+  return Experiment::parse(checkpointYaml(kind), kind + ".yaml", overrides);
+}
+
+}  // namespace pmeta::test
