@@ -41,7 +41,8 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
     }
     const std::vector<int> missing = aggregator.closeRound();
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    book.closeRound(round, aggregator.metaPolicy().participants, missing, seconds.count());
+    book.closeRound(round, aggregator.metaPolicy().participants, missing, seconds.count(),
+                    aggregator.excluded());
     for (TaskAgent& agent : agents) {
       if (!experiment.evaluatesMeta()) break;
       for (const TaskReturn& result : agent.evaluateMeta(aggregator.metaPolicy())) book.add(result);
