@@ -1,6 +1,7 @@
 #pragma once
 
 #include <pmeta_msgs/AuxiliaryUpdate.h>
+#include <pmeta_msgs/MetaPolicy.h>
 #include <pmeta_msgs/RoundSummary.h>
 #include <pmeta_msgs/TaskReturn.h>
 #include <ros/ros.h>
@@ -17,10 +18,12 @@
 
 #include "health.h"
 #include "mailbox.h"
+#include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/console.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/meta_aggregator.h"
 #include "pmeta_core/run/run_log.h"
+#include "refusals.h"
 
 namespace pmeta_nodes {
 
@@ -54,11 +57,13 @@ class MetaAggregatorNode {
   void takeUpdate(const pmeta_msgs::AuxiliaryUpdate& msg);
   void takeReturn(const pmeta_msgs::TaskReturn& msg);
   void refuse(const std::string& reason);
+  void refuseUpdate(const pmeta_msgs::AuxiliaryUpdate& msg, const std::string& reason);
   void closeRoundIfDue();
   void writeCompleteRounds(bool force);
   void publishMetaPolicy();
   void announcePause();
   void publishRound(std::uint8_t state, const std::string& message);
+  void reportHealth();
   void announceLateness();
   std::string taskNames(const std::vector<int>& tasks) const;
   double roundSeconds() const;
@@ -66,6 +71,7 @@ class MetaAggregatorNode {
 
   const pmeta::Experiment& experiment_;
   const bool hold_;
+  const pmeta::Authenticator authenticator_;
   pmeta::MetaAggregator aggregator_;  ///< the worker's, as are book_ and log_
   pmeta::RoundBook book_;
   pmeta::RunLog log_;
@@ -75,9 +81,11 @@ class MetaAggregatorNode {
   std::optional<Clock::time_point> held_since_;  ///< the round is due, but the run is paused
   bool pause_announced_ = false;
   pmeta_msgs::RoundSummary summary_;  ///< of the last complete round
+  Refusals refusals_;
 
   ros::NodeHandle nh_;
   ros::Publisher meta_pub_;
+  pmeta_msgs::MetaPolicy::ConstPtr meta_msg_;  ///< the newest, as it was sent
   ros::Publisher round_pub_;
   ros::Subscriber auxiliary_sub_;
   ros::Subscriber returns_sub_;
