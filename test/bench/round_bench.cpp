@@ -4,7 +4,9 @@
 
 #include "bench_util.h"
 #include "pmeta_core/aggregate/mix.h"
+#include "pmeta_core/aggregate/trimmed_mix.h"
 #include "pmeta_core/env/gridworld.h"
+#include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/task_agent.h"
 
@@ -52,6 +54,42 @@ void Aggregate(benchmark::State& state) {
          bytes / read, "reading them once");
 }
 BENCHMARK(Aggregate)->Unit(benchmark::kMillisecond);
+
+// the robust rules beside the mean
+void aggregateTrimmed(benchmark::State& state, double trim, int row, const std::string& rule) {
+  std::vector<pmeta::Contribution> contributions;
+  for (const pmeta::Model& model : models()) contributions.push_back({&model, 1.0});
+  pmeta::Model meta(models().front().layout);
+  double read = callSeconds(3, 1, readModels);
+  const double seconds = callSeconds(state, 1, [&] {
+    pmeta::mixTrimmedInto(meta, contributions, 0.5, trim);
+    benchmark::DoNotOptimize(meta.floats().data());
+  });
+  read = std::min(read, callSeconds(3, 1, readModels));
+  const double bytes = kAgents * kParameters * sizeof(float);
+  report({Part::kLoops, row}, "the same, by " + rule, Unit::kBytes, bytes / seconds, bytes / read,
+         "reading them once");
+}
+BENCHMARK_CAPTURE(aggregateTrimmed, median, 0.5, 32, "median")->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(aggregateTrimmed, trimmed_mean, 0.2, 33, "trimmed mean")
+    ->Unit(benchmark::kMillisecond);
+
+// signing an update of 4 MB; to check one is the same and a comparison of 32 bytes
+void Authenticate(benchmark::State& state) {
+  const pmeta::Authenticator authenticator(pmeta::Key{1, 2, 3});
+  pmeta::ModelView view;
+  view.layout = models().front().layout.text();
+  view.floats = models().front().floats().data();
+  view.num_floats = kParameters;
+  const pmeta::AuxiliaryUpdate header;
+  const pmeta::Mac expected = authenticator.mac(header, view);
+  const double seconds = callSeconds(state, 1, [&] {
+    const pmeta::Mac mac = authenticator.mac(header, view);
+    benchmark::DoNotOptimize(pmeta::Authenticator::compare(mac, expected));
+  });
+  report({Part::kLoops, 34}, "MAC of 1 M float32, made or checked", Unit::kSeconds, seconds);
+}
+BENCHMARK(Authenticate)->Unit(benchmark::kMillisecond);
 
 // seconds of drawing as many transitions as a round does, with nothing learnt from them
 double drawingSeconds(int samples) {

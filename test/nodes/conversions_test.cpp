@@ -181,6 +181,104 @@ TEST(Conversions, ImpossibleReturnsAreRefused) {
   EXPECT_EQ(errorOf([&] { fromMsg(msg); }), "a message has an impossible task, 4294967295.");
 }
 
+TEST(Conversions, RoundSummaryRoundTrip) {
+  const auto experiment = pmeta::Experiment::parse("run_id: run", "test");
+  pmeta::RoundSummary summary;
+  summary.run_id = "run";
+  summary.round = 3;
+  summary.rounds = 9;
+  summary.personal_return = -1;
+  summary.meta_return = -2;
+  summary.test_return = -3;
+  summary.participants = {0, 2};
+  summary.missing = {1};
+  summary.excluded = {3, 4};
+  summary.seconds = 0.5;
+  summary.eta_seconds = 3;
+  const pmeta::RoundSummary back = fromMsg(overTheWire(toMsg(summary, experiment)));
+  EXPECT_EQ(back.run_id, "run");
+  EXPECT_EQ(back.round, 3);
+  EXPECT_EQ(back.rounds, 9);
+  EXPECT_EQ(back.personal_return, -1);
+  EXPECT_EQ(back.meta_return, -2);
+  EXPECT_EQ(back.test_return, -3);
+  EXPECT_EQ(back.participants, summary.participants);
+  EXPECT_EQ(back.missing, summary.missing);
+  EXPECT_EQ(back.excluded, summary.excluded);
+  EXPECT_EQ(back.seconds, 0.5);
+  EXPECT_EQ(back.eta_seconds, 3);
+}
+
+pmeta::Authenticator someKey() { return pmeta::Authenticator(pmeta::Key{1, 2, 3}); }
+
+// signed, over the wire, and then each change by itself
+template <class Msg>
+void expectGuarded(Msg msg, const std::vector<std::function<void(Msg&)>>& changes) {
+  using pmeta::Authenticity;
+  EXPECT_EQ(authenticate(someKey(), msg), Authenticity::kUnsigned);
+  sign(someKey(), msg);
+  EXPECT_EQ(msg.mac.size(), 32u);
+  msg = overTheWire(msg);
+  EXPECT_EQ(authenticate(someKey(), msg), Authenticity::kAuthentic);
+  EXPECT_EQ(authenticate(pmeta::Authenticator(pmeta::Key{9}), msg), Authenticity::kForged);
+  EXPECT_EQ(authenticate(pmeta::Authenticator(), msg), Authenticity::kAuthentic)
+      << "without a key a MAC is not looked at";
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    Msg changed = msg;
+    changes[i](changed);
+    EXPECT_EQ(authenticate(someKey(), changed), Authenticity::kForged) << "change " << i;
+  }
+}
+
+TEST(Conversions, TheMacOfAnUpdateGuardsEachField) {
+  using M = pmeta_msgs::AuxiliaryUpdate;
+  expectGuarded<M>(
+      toMsg(pmeta::AuxiliaryUpdate{"run", 4, 9, tableModel(), 2.5}),
+      {[](M& m) { m.run_id = "other"; }, [](M& m) { m.task = 3; },
+       [](M& m) { m.task = 0xffffffffu; }, [](M& m) { m.round = 8; }, [](M& m) { m.weight = 2; },
+       [](M& m) { m.model.layout += " "; }, [](M& m) { m.model.layout_hash ^= 1; },
+       [](M& m) { m.model.float64_values[0] = 0.2; },
+       [](M& m) { m.model.float64_values.push_back(0); },
+       [](M& m) { m.model.float32_values.push_back(0); }, [](M& m) { m.model.present[4] = 1; },
+       [](M& m) { m.model.present.clear(); }, [](M& m) { m.model.checksum ^= 1; },
+       [](M& m) { m.mac[31] ^= 0x80; }});
+}
+
+TEST(Conversions, TheMacOfAMetaPolicyGuardsEachField) {
+  using M = pmeta_msgs::MetaPolicy;
+  expectGuarded<M>(
+      toMsg(pmeta::MetaPolicy{"run", 3, networkModel(), {0, 2}}, 10),
+      {[](M& m) { m.run_id = "other"; }, [](M& m) { m.round = 4; }, [](M& m) { m.rounds = 4; },
+       [](M& m) { m.participants.pop_back(); }, [](M& m) { m.model.float32_values[5] = 8; }});
+}
+
+TEST(Conversions, TheMacOfAReturnGuardsEachField) {
+  using M = pmeta_msgs::TaskReturn;
+  expectGuarded<M>(toMsg(pmeta::TaskReturn(), "grid"),
+                   {[](M& m) { m.run_id = "other"; }, [](M& m) { m.task = 1; },
+                    [](M& m) { m.task_name = "grib"; }, [](M& m) { m.round = 1; },
+                    [](M& m) { m.policy = M::META; }, [](M& m) { m.policy = 7; },
+                    [](M& m) { m.split = M::TEST; }, [](M& m) { m.context_episodes = 1; },
+                    [](M& m) { m.return_mean = 1; }, [](M& m) { m.return_std = 1; },
+                    [](M& m) { m.episodes = 1; }, [](M& m) { m.env_steps = 1; },
+                    [](M& m) { m.updates = 1; }, [](M& m) { m.wall_s = 1; }});
+}
+
+TEST(Conversions, TheMacOfARoundMessageGuardsEachField) {
+  using M = pmeta_msgs::RoundSummary;
+  M msg = toMsg(pmeta::RoundSummary(), pmeta::Experiment::parse("run_id: run", "test"));
+  msg.message = "all is well";
+  msg.header.stamp = ros::Time(5, 6);
+  expectGuarded<M>(
+      msg, {[](M& m) { m.run_id = "other"; }, [](M& m) { m.experiment = ""; },
+            [](M& m) { m.header.stamp.nsec = 7; }, [](M& m) { m.state = M::FINISHED; },
+            [](M& m) { m.message = ""; }, [](M& m) { m.round = 1; }, [](M& m) { m.rounds = 1; },
+            [](M& m) { m.personal_return = 1; }, [](M& m) { m.meta_return = 1; },
+            [](M& m) { m.test_return = 1; }, [](M& m) { m.participants = {1}; },
+            [](M& m) { m.missing = {1}; }, [](M& m) { m.excluded = {1}; },
+            [](M& m) { m.round_s = 1; }, [](M& m) { m.eta_s = 1; }, [](M& m) { m.refused = 1; }});
+}
+
 TEST(Mailbox, DropsTheOldestWhenFull) {
   Mailbox<int> mailbox(2);
   for (int i = 1; i <= 3; ++i) mailbox.push(i);

@@ -1,7 +1,9 @@
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <pmeta_msgs/AuxiliaryUpdate.h>
 
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "pmeta_core/run/task_agent.h"
 #include "run_over_ros.h"
@@ -11,7 +13,20 @@ namespace {
 
 class Refusal : public RunOverRos {
  protected:
-  Refusal() : pub_(nh_.advertise<pmeta_msgs::AuxiliaryUpdate>("auxiliary", 16)) {}
+  Refusal()
+      : pub_(nh_.advertise<pmeta_msgs::AuxiliaryUpdate>("auxiliary", 16)),
+        diagnostics_sub_(nh_.subscribe("/diagnostics", 100, &Refusal::onDiagnostics, this)) {}
+
+  void onDiagnostics(const diagnostic_msgs::DiagnosticArray& msg) {
+    for (const auto& status : msg.status) {
+      for (const auto& value : status.values) health_[status.name + "/" + value.key] = value.value;
+    }
+  }
+
+  // of task 0 in the aggregator's diagnostics
+  std::string health() {
+    return health_["meta_aggregator: meta aggregator/" + experiment_.family().taskName(0)];
+  }
 
   // an update of task 0 that the aggregator would take, but for what `spoil` does to it
   pmeta_msgs::AuxiliaryUpdate goodUpdate() {
@@ -33,6 +48,8 @@ class Refusal : public RunOverRos {
   }
 
   ros::Publisher pub_;
+  ros::Subscriber diagnostics_sub_;
+  std::map<std::string, std::string> health_;
 };
 
 TEST_F(Refusal, BadUpdatesAreRefusedWithTheirReasonAndTheRunIsUnharmed) {
@@ -70,13 +87,31 @@ TEST_F(Refusal, BadUpdatesAreRefusedWithTheirReasonAndTheRunIsUnharmed) {
   expectRefused(msg, "is not one of this run's 5 tasks");
 
   msg = goodUpdate();
+  msg.round = 1000;
+  expectRefused(msg, "task 0 reports round 1000 but round");
+
+  msg = goodUpdate();
+  msg.round = 0xffffffffu;
+  expectRefused(msg, "impossible round");
+
+  msg = goodUpdate();
   msg.weight = -1;
   expectRefused(msg, "not a positive number");
 
   EXPECT_FALSE(finished()) << "the run was over before the last refusal";
   ASSERT_TRUE(waitFor([&] { return finished(); }));
-  EXPECT_GE(summary_->refused, 8u);
+  EXPECT_GE(summary_->refused, 10u);
   expectEqualsLocal();
+
+  // all of them but that of task 77, by the agent they were of
+  const std::string reason = "task 0 has weight -1, which is not a positive number.";
+  ASSERT_TRUE(waitFor(
+      [&] {
+        return health().find(" 9 refused, 0 left out; last reason: " + reason) != std::string::npos;
+      },
+      10))
+      << health();
+  EXPECT_EQ(health().rfind("10 accepted, ", 0), 0u) << health();
 }
 
 }  // namespace

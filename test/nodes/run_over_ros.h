@@ -112,10 +112,19 @@ class RunOverRos : public ::testing::Test {
   std::vector<pmeta_msgs::RoundSummary> history_;
 
  private:
-  void onMeta(const pmeta_msgs::MetaPolicy::ConstPtr& msg) { meta_ = msg; }
-  void onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
-    summary_ = msg;
-    history_.push_back(*msg);
+  // a test may publish forged ones itself
+  template <class Msg>
+  static bool isOwn(const ros::MessageEvent<const Msg>& event) {
+    return event.getPublisherName() == ros::this_node::getName();
+  }
+
+  void onMeta(const ros::MessageEvent<const pmeta_msgs::MetaPolicy>& event) {
+    if (!isOwn(event)) meta_ = event.getMessage();
+  }
+  void onRound(const ros::MessageEvent<const pmeta_msgs::RoundSummary>& event) {
+    if (isOwn(event)) return;
+    summary_ = event.getMessage();
+    history_.push_back(*summary_);
   }
 
   ros::Subscriber meta_sub_;

@@ -23,6 +23,44 @@ int toInt(std::uint32_t value, const char* what) {
   return static_cast<int>(value);
 }
 
+std::vector<int> toTasks(const std::vector<std::uint32_t>& values) {
+  std::vector<int> tasks;
+  for (const std::uint32_t value : values) tasks.push_back(toInt(value, "task"));
+  return tasks;
+}
+
+pmeta::ModelView viewOf(const pmeta_msgs::ModelBlob& msg) {
+  pmeta::ModelView view;
+  view.layout = msg.layout;
+  view.layout_hash = msg.layout_hash;
+  view.floats = msg.float32_values.data();
+  view.num_floats = msg.float32_values.size();
+  view.doubles = msg.float64_values.data();
+  view.num_doubles = msg.float64_values.size();
+  view.present = msg.present.data();
+  view.num_present = msg.present.size();
+  view.checksum = msg.checksum;
+  return view;
+}
+
+// all but the model
+pmeta::MetaPolicy headerOf(const pmeta_msgs::MetaPolicy& msg) {
+  pmeta::MetaPolicy meta;
+  meta.run_id = msg.run_id;
+  meta.round = toInt(msg.round, "round");
+  meta.participants = toTasks(msg.participants);
+  return meta;
+}
+
+pmeta::AuxiliaryUpdate headerOf(const pmeta_msgs::AuxiliaryUpdate& msg) {
+  pmeta::AuxiliaryUpdate update;
+  update.run_id = msg.run_id;
+  update.task = toInt(msg.task, "task");
+  update.round = toInt(msg.round, "round");
+  update.weight = msg.weight;
+  return update;
+}
+
 }  // namespace
 
 pmeta_msgs::ModelBlob toMsg(const pmeta::Model& model) {
@@ -82,13 +120,8 @@ pmeta_msgs::MetaPolicy toMsg(const pmeta::MetaPolicy& meta, int rounds) {
 }
 
 pmeta::MetaPolicy fromMsg(const pmeta_msgs::MetaPolicy& msg) {
-  pmeta::MetaPolicy meta;
-  meta.run_id = msg.run_id;
-  meta.round = toInt(msg.round, "round");
+  pmeta::MetaPolicy meta = headerOf(msg);
   meta.model = fromMsg(msg.model);
-  for (const std::uint32_t task : msg.participants) {
-    meta.participants.push_back(toInt(task, "task"));
-  }
   return meta;
 }
 
@@ -103,12 +136,8 @@ pmeta_msgs::AuxiliaryUpdate toMsg(const pmeta::AuxiliaryUpdate& update) {
 }
 
 pmeta::AuxiliaryUpdate fromMsg(const pmeta_msgs::AuxiliaryUpdate& msg) {
-  pmeta::AuxiliaryUpdate update;
-  update.run_id = msg.run_id;
-  update.task = toInt(msg.task, "task");
-  update.round = toInt(msg.round, "round");
+  pmeta::AuxiliaryUpdate update = headerOf(msg);
   update.model = fromMsg(msg.model);
-  update.weight = msg.weight;
   return update;
 }
 
@@ -199,9 +228,49 @@ pmeta_msgs::RoundSummary toMsg(const pmeta::RoundSummary& summary,
   msg.test_return = summary.test_return;
   msg.participants = toUnsigned(summary.participants);
   msg.missing = toUnsigned(summary.missing);
+  msg.excluded = toUnsigned(summary.excluded);
   msg.round_s = summary.seconds;
   msg.eta_s = summary.eta_seconds;
   return msg;
+}
+
+pmeta::RoundSummary fromMsg(const pmeta_msgs::RoundSummary& msg) {
+  pmeta::RoundSummary summary;
+  summary.run_id = msg.run_id;
+  summary.round = toInt(msg.round, "round");
+  summary.rounds = toInt(msg.rounds, "number of rounds");
+  summary.personal_return = msg.personal_return;
+  summary.meta_return = msg.meta_return;
+  summary.test_return = msg.test_return;
+  summary.participants = toTasks(msg.participants);
+  summary.missing = toTasks(msg.missing);
+  summary.excluded = toTasks(msg.excluded);
+  summary.seconds = msg.round_s;
+  summary.eta_seconds = msg.eta_s;
+  return summary;
+}
+
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator,
+                 const pmeta_msgs::AuxiliaryUpdate& msg) {
+  return authenticator.mac(headerOf(msg), viewOf(msg.model));
+}
+
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::MetaPolicy& msg) {
+  return authenticator.mac(headerOf(msg), viewOf(msg.model), toInt(msg.rounds, "number of rounds"));
+}
+
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::TaskReturn& msg) {
+  return authenticator.mac(fromMsg(msg), msg.task_name);
+}
+
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::RoundSummary& msg) {
+  pmeta::RoundNews news;
+  news.experiment = msg.experiment;
+  news.state = msg.state;
+  news.message = msg.message;
+  news.refused = msg.refused;
+  news.stamp = static_cast<std::int64_t>(msg.header.stamp.toNSec());
+  return authenticator.mac(fromMsg(msg), news);
 }
 
 }  // namespace pmeta_nodes

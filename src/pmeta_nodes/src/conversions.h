@@ -7,7 +7,9 @@
 #include <pmeta_msgs/TaskReturn.h>
 #include <pmeta_msgs/Trajectory.h>
 
+#include "pmeta_core/base/error.h"
 #include "pmeta_core/personal/personal_learner.h"
+#include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/protocol.h"
 
@@ -35,5 +37,31 @@ pmeta_msgs::Trajectory toMsg(const pmeta::Episode& episode, const pmeta::Experim
 /// Fills the fields a finished round gives; state and message are the caller's.
 pmeta_msgs::RoundSummary toMsg(const pmeta::RoundSummary& summary,
                                const pmeta::Experiment& experiment);
+pmeta::RoundSummary fromMsg(const pmeta_msgs::RoundSummary& msg);
+
+// The MAC that a message's contents ask for, read from the message as it is. They throw
+// pmeta::Error if a field is of no run.
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::AuxiliaryUpdate& msg);
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::MetaPolicy& msg);
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::TaskReturn& msg);
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::RoundSummary& msg);
+
+/// Fills in the MAC, once all other fields are; without a key the message stays as it is.
+template <class Msg>
+void sign(const pmeta::Authenticator& authenticator, Msg& msg) {
+  if (authenticator.hasKey()) msg.mac = macOf(authenticator, msg);
+}
+
+/// Whether a message is from somebody with the key. Unpacks no model.
+template <class Msg>
+pmeta::Authenticity authenticate(const pmeta::Authenticator& authenticator, const Msg& msg) {
+  if (!authenticator.hasKey()) return pmeta::Authenticity::kAuthentic;
+  if (msg.mac.empty()) return pmeta::Authenticity::kUnsigned;
+  try {
+    return pmeta::Authenticator::compare(msg.mac, macOf(authenticator, msg));
+  } catch (const pmeta::Error&) {
+    return pmeta::Authenticity::kForged;  // nobody signs what cannot be
+  }
+}
 
 }  // namespace pmeta_nodes

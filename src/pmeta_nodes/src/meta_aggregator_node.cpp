@@ -1,6 +1,5 @@
 #include "meta_aggregator_node.h"
 
-#include <pmeta_msgs/MetaPolicy.h>
 #include <ros/callback_queue.h>
 #include <unistd.h>
 
@@ -56,6 +55,7 @@ void logLines(const std::string& text) {
 MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool hold)
     : experiment_(experiment),
       hold_(hold),
+      authenticator_(experiment.settings().key_file),
       aggregator_(experiment),
       book_(experiment),
       log_(experiment),
@@ -187,22 +187,42 @@ void MetaAggregatorNode::take(const Message& message) {
 }
 
 void MetaAggregatorNode::takeUpdate(const pmeta_msgs::AuxiliaryUpdate& msg) {
+  const std::string forgery = refusals_.judge("an update", authenticate(authenticator_, msg));
+  if (!forgery.empty()) return refuse(forgery);
   // a foreign run's blob is not even unpacked
   if (msg.run_id != summary_.run_id) {
-    return refuse("an update belongs to run '" + msg.run_id + "', not to '" + summary_.run_id +
-                  "'.");
+    return refuseUpdate(
+        msg, "an update belongs to run '" + msg.run_id + "', not to '" + summary_.run_id + "'.");
   }
-  const auto answer =
-      aggregator_.offer(std::make_shared<const pmeta::AuxiliaryUpdate>(fromMsg(msg)));
-  if (answer.verdict == Verdict::kRefused) refuse(answer.reason);
+  try {
+    const auto answer =
+        aggregator_.offer(std::make_shared<const pmeta::AuxiliaryUpdate>(fromMsg(msg)));
+    if (answer.verdict == Verdict::kRefused) return refuse(answer.reason);
+  } catch (const pmeta::Error& error) {
+    return refuseUpdate(msg, error.what());
+  }
+  reportHealth();
 }
 
-void MetaAggregatorNode::takeReturn(const pmeta_msgs::TaskReturn& msg) { book_.add(fromMsg(msg)); }
+void MetaAggregatorNode::takeReturn(const pmeta_msgs::TaskReturn& msg) {
+  const std::string forgery = refusals_.judge("a return", authenticate(authenticator_, msg));
+  if (!forgery.empty()) return refuse(forgery);
+  refusals_.count(book_.add(fromMsg(msg)) ? "returns booked" : "returns not due");
+  reportHealth();
+}
+
+void MetaAggregatorNode::refuseUpdate(const pmeta_msgs::AuxiliaryUpdate& msg,
+                                      const std::string& reason) {
+  aggregator_.countRefusal(static_cast<int>(msg.task), reason);
+  refuse(reason);
+}
 
 void MetaAggregatorNode::refuse(const std::string& reason) {
   ++summary_.refused;
-  ROS_WARN("refused: %s", reason.c_str());
-  publishRound(RoundSummary::RUNNING, "refused: " + reason);
+  if (!refusals_.mayTell()) return reportHealth();
+  const std::string told = "refused: " + reason + refusals_.untold();
+  ROS_WARN("%s", told.c_str());
+  publishRound(RoundSummary::RUNNING, told);
 }
 
 double MetaAggregatorNode::roundSeconds() const {
@@ -235,7 +255,12 @@ void MetaAggregatorNode::closeRoundIfDue() {
   if (!missing.empty()) {
     ROS_WARN("round %d was closed by quorum without %s.", round, taskNames(missing).c_str());
   }
-  book_.closeRound(round, aggregator_.metaPolicy().participants, missing, seconds);
+  for (const auto& exclusion : aggregator_.exclusions()) {
+    ROS_WARN("round %d leaves out the update of %s: %s.", round,
+             taskNames({exclusion.task}).c_str(), exclusion.reason.c_str());
+  }
+  book_.closeRound(round, aggregator_.metaPolicy().participants, missing, seconds,
+                   aggregator_.excluded());
   publishMetaPolicy();
 }
 
@@ -251,8 +276,11 @@ void MetaAggregatorNode::writeCompleteRounds(bool force) {
       summary_.meta_return = before.meta_return;
       summary_.test_return = before.test_return;
     }
-    publishRound(RoundSummary::RUNNING,
-                 "round " + std::to_string(round.summary.round) + " is complete");
+    const std::vector<int>& excluded = round.summary.excluded;
+    publishRound(
+        RoundSummary::RUNNING,
+        "round " + std::to_string(round.summary.round) + " is complete" +
+            (excluded.empty() ? "" : "; the updates left out are those of " + taskNames(excluded)));
     const std::string line = console_.take(round);
     if (!line.empty()) ROS_INFO("%s", line.c_str());
   }
@@ -262,7 +290,9 @@ void MetaAggregatorNode::publishMetaPolicy() {
   auto msg = boost::make_shared<pmeta_msgs::MetaPolicy>(
       toMsg(aggregator_.metaPolicy(), experiment_.settings().rounds));
   msg->header.stamp = ros::Time::now();
-  meta_pub_.publish(boost::shared_ptr<const pmeta_msgs::MetaPolicy>(msg));
+  sign(authenticator_, *msg);
+  meta_msg_ = msg;
+  meta_pub_.publish(meta_msg_);
   round_start_ = Clock::now();
   held_since_.reset();
   next_announcement_ =
@@ -281,9 +311,14 @@ void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& mes
   summary_.header.stamp = ros::Time::now();
   const std::vector<std::uint32_t> of_last_round = summary_.missing;
   if (silent) summary_.missing.assign(silent_.begin(), silent_.end());
+  sign(authenticator_, summary_);
   round_pub_.publish(summary_);
   summary_.missing = of_last_round;
+  reportHealth();
+}
 
+void MetaAggregatorNode::reportHealth() {
+  const std::uint8_t state = summary_.state;
   const std::lock_guard<std::mutex> lock(health_mutex_);
   health_report_ = {};
   health_report_.level = state == RoundSummary::LATE      ? HealthReport::kWarn
@@ -295,12 +330,15 @@ void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& mes
                            {"refused", std::to_string(summary_.refused)}};
   for (int task = 0; task < experiment_.numTasks(); ++task) {
     const auto& counts = aggregator_.counts()[task];
-    health_report_.values.emplace_back(experiment_.family().taskName(task),
-                                       std::to_string(counts.accepted) + " accepted, " +
-                                           std::to_string(counts.duplicate) + " duplicate, " +
-                                           std::to_string(counts.stale) + " stale, " +
-                                           std::to_string(counts.refused) + " refused");
+    health_report_.values.emplace_back(
+        experiment_.family().taskName(task),
+        std::to_string(counts.accepted) + " accepted, " + std::to_string(counts.duplicate) +
+            " duplicate, " + std::to_string(counts.stale) + " stale, " +
+            std::to_string(counts.refused) + " refused, " + std::to_string(counts.excluded) +
+            " left out" +
+            (counts.last_reason.empty() ? "" : "; last reason: " + counts.last_reason));
   }
+  for (auto& value : refusals_.values()) health_report_.values.push_back(std::move(value));
 }
 
 void MetaAggregatorNode::announcePause() {
@@ -341,6 +379,8 @@ void MetaAggregatorNode::announceMissing() {
   summary_.missing.assign(missing.begin(), missing.end());
   publishRound(RoundSummary::LATE, message);
   summary_.missing = of_last_round;
+  // forged ones may have pushed it out of somebody's queue
+  if (authenticator_.hasKey()) meta_pub_.publish(meta_msg_);
   ROS_WARN("%s", message.c_str());
 }
 

@@ -2,6 +2,7 @@
 
 #include <pmeta_msgs/AgentStatus.h>
 #include <pmeta_msgs/AuxiliaryUpdate.h>
+#include <pmeta_msgs/MetaPolicy.h>
 #include <pmeta_msgs/RoundSummary.h>
 #include <pmeta_msgs/TaskReturn.h>
 #include <ros/ros.h>
@@ -18,10 +19,12 @@
 
 #include "health.h"
 #include "mailbox.h"
+#include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/console.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/meta_aggregator.h"
 #include "pmeta_core/run/run_log.h"
+#include "refusals.h"
 #include "roll_call.h"
 
 namespace pmeta_nodes {
@@ -57,6 +60,7 @@ class MetaAggregatorNode {
   void takeUpdate(const pmeta_msgs::AuxiliaryUpdate& msg);
   void takeReturn(const pmeta_msgs::TaskReturn& msg);
   void refuse(const std::string& reason);
+  void refuseUpdate(const pmeta_msgs::AuxiliaryUpdate& msg, const std::string& reason);
   void closeRoundIfDue();
   void writeCompleteRounds(bool force);
   void publishMetaPolicy();
@@ -66,12 +70,14 @@ class MetaAggregatorNode {
   int roundInHand() const;
   std::string silenceText() const;
   std::string waitText() const;
+  void reportHealth();
   std::string taskNames(const std::vector<int>& tasks) const;
   double roundSeconds() const;
   HealthReport health();
 
   const pmeta::Experiment& experiment_;
   const bool hold_;
+  const pmeta::Authenticator authenticator_;
   pmeta::MetaAggregator aggregator_;  ///< the worker's, as are book_ and log_
   pmeta::RoundBook book_;
   pmeta::RunLog log_;
@@ -83,9 +89,11 @@ class MetaAggregatorNode {
   pmeta_msgs::RoundSummary summary_;  ///< of the last complete round
   RollCall roll_call_;
   std::vector<int> silent_;  ///< as announced
+  Refusals refusals_;
 
   ros::NodeHandle nh_;
   ros::Publisher meta_pub_;
+  pmeta_msgs::MetaPolicy::ConstPtr meta_msg_;  ///< the newest, as it was sent
   ros::Publisher round_pub_;
   ros::Subscriber auxiliary_sub_;
   ros::Subscriber returns_sub_;

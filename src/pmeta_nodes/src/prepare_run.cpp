@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/run_log.h"
 
@@ -130,6 +131,7 @@ int prepare(std::vector<std::string> words) {
   words.erase(words.begin(), words.begin() + 2);
 
   const Experiment experiment = Experiment::load(config, readAssignments(words));
+  const pmeta::Authenticator probe(experiment.settings().key_file);
   pmeta::requireWritable(experiment.settings().results_dir + "/" +
                          experiment.settings().experiment);
   if (!pmeta::runStatus(experiment.runDir()).empty()) {

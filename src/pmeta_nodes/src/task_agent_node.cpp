@@ -20,6 +20,8 @@ constexpr auto kLongestResend = std::chrono::seconds(30);
 // it would respawn an agent that ends first
 constexpr auto kFarewell = std::chrono::seconds(10);
 constexpr double kAggregatorWait = 5.0;
+// one would do, but a forged one behind it must not push it out
+constexpr std::uint32_t kMetaPolicies = 8;
 
 const char* stateName(std::uint8_t state) {
   switch (state) {
@@ -41,7 +43,9 @@ const char* stateName(std::uint8_t state) {
 }  // namespace
 
 TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task)
-    : experiment_(experiment), agent_(experiment, task) {
+    : experiment_(experiment),
+      agent_(experiment, task),
+      authenticator_(experiment.settings().key_file) {
   status_.run_id = experiment.settings().run_id;
   status_.task = static_cast<std::uint32_t>(task);
   status_.task_name = experiment.family().taskName(task);
@@ -61,7 +65,8 @@ TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task)
         });
   }
   setState(AgentStatus::WAITING, "waiting for a meta-policy");
-  meta_sub_ = nh_.subscribe("meta_policy", 1, &TaskAgentNode::onMetaPolicy, this, hints);
+  meta_sub_ =
+      nh_.subscribe("meta_policy", kMetaPolicies, &TaskAgentNode::onMetaPolicy, this, hints);
   round_sub_ = nh_.subscribe("round", 4, &TaskAgentNode::onRound, this, hints);
   status_timer_ = nh_.createWallTimer(ros::WallDuration(0.5),
                                       [this](const ros::WallTimerEvent&) { publishStatus(); });
@@ -90,7 +95,22 @@ int TaskAgentNode::spin() {
   return failed_ ? 1 : 0;
 }
 
+bool TaskAgentNode::isAuthentic(const std::string& kind, pmeta::Authenticity authenticity) {
+  const std::string forgery = refusals_.judge(kind, authenticity);
+  if (forgery.empty()) return true;
+  if (!refusals_.mayTell()) return false;
+  ROS_WARN("ignored: %s%s", forgery.c_str(), refusals_.untold().c_str());
+  bool alone = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    alone = newest_round_ < 0;
+  }
+  if (alone) setState(AgentStatus::WAITING, "waiting for a meta-policy; ignored: " + forgery);
+  return false;
+}
+
 void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::ConstPtr& msg) {
+  if (!isAuthentic("a meta-policy", authenticate(authenticator_, *msg))) return;
   if (msg->run_id != status_.run_id) {
     ROS_WARN_THROTTLE(10, "ignoring a meta-policy of run '%s'; this agent belongs to '%s'.",
                       msg->run_id.c_str(), status_.run_id.c_str());
@@ -116,7 +136,12 @@ void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::ConstPtr& msg) {
 }
 
 void TaskAgentNode::onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
+  if (!isAuthentic("a round message", authenticate(authenticator_, *msg))) return;
   if (msg->run_id != status_.run_id) return;
+  if (authenticator_.hasKey() && msg->header.stamp < newest_news_) {
+    return refusals_.count("replayed: a round message");
+  }
+  newest_news_ = msg->header.stamp;
   if (msg->state != pmeta_msgs::RoundSummary::FINISHED &&
       msg->state != pmeta_msgs::RoundSummary::STOPPED) {
     return;
@@ -221,6 +246,7 @@ void TaskAgentNode::waitForAggregator() {
 void TaskAgentNode::deliver(const pmeta::TaskReturn& result) {
   pmeta_msgs::TaskReturn msg = toMsg(result, status_.task_name);
   msg.header.stamp = ros::Time::now();
+  sign(authenticator_, msg);
   returns_pub_.publish(msg);
   const std::lock_guard<std::mutex> lock(mutex_);
   unconfirmed_returns_.push_back(std::move(msg));
@@ -231,6 +257,7 @@ void TaskAgentNode::deliver(const pmeta::TaskReturn& result) {
 void TaskAgentNode::deliver(const pmeta::AuxiliaryUpdate& update) {
   pmeta_msgs::AuxiliaryUpdate msg = toMsg(update);
   msg.header.stamp = ros::Time::now();
+  sign(authenticator_, msg);
   auxiliary_pub_.publish(msg);
   const std::lock_guard<std::mutex> lock(mutex_);
   unconfirmed_updates_.push_back(std::move(msg));
@@ -285,6 +312,11 @@ HealthReport TaskAgentNode::health() {
                    {"distance to meta", pmeta::formatNumber(status_.distance_to_meta)},
                    {"unconfirmed messages",
                     std::to_string(unconfirmed_returns_.size() + unconfirmed_updates_.size())}};
+  for (auto& value : refusals_.values()) {
+    // of strangers only: it is not taking part
+    if (newest_round_ < 0) report.level = std::max(report.level, HealthReport::kWarn);
+    report.values.push_back(std::move(value));
+  }
   return report;
 }
 

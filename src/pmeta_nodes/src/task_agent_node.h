@@ -19,8 +19,10 @@
 
 #include "health.h"
 #include "mailbox.h"
+#include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/task_agent.h"
+#include "refusals.h"
 
 namespace pmeta_nodes {
 
@@ -28,7 +30,8 @@ namespace pmeta_nodes {
 ///
 /// Subscribes to meta_policy and round; publishes auxiliary, returns, agent_status and
 /// task_<i>/trajectory. What the aggregator must get is sent again until a newer meta-policy, or
-/// the end of the run, shows that it has it. The last round's personal policy stays on this
+/// the end of the run, shows that it has it. With a key_file, what it sends is signed and what is
+/// not authentic it ignores. The last round's personal policy stays on this
 /// machine, as policies/task_<i>.safetensors of the run folder.
 class TaskAgentNode {
  public:
@@ -43,6 +46,7 @@ class TaskAgentNode {
 
   void onMetaPolicy(const pmeta_msgs::MetaPolicy::ConstPtr& msg);
   void onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg);
+  bool isAuthentic(const std::string& kind, pmeta::Authenticity authenticity);
 
   void train();
   void trainFrom(const pmeta::MetaPolicy& meta);
@@ -58,6 +62,7 @@ class TaskAgentNode {
 
   const pmeta::Experiment& experiment_;
   pmeta::TaskAgent agent_;
+  const pmeta::Authenticator authenticator_;
   ros::NodeHandle nh_;
   ros::Publisher auxiliary_pub_;
   ros::Publisher returns_pub_;
@@ -72,6 +77,9 @@ class TaskAgentNode {
   std::atomic<bool> stop_{false};
   std::atomic<bool> failed_{false};
   std::atomic<bool> run_ended_{false};
+
+  Refusals refusals_;      ///< the spinning thread's, as is newest_news_
+  ros::Time newest_news_;  ///< stamp of the newest message about the run's state
 
   std::mutex mutex_;  ///< guards what follows
   pmeta_msgs::AgentStatus status_;

@@ -132,6 +132,35 @@ TEST(Experiment, ValuesOutOfRangeAreRefused) {
             "aggregation.quorum is 6 but there are 5 tasks: give at most that, or 0 for all.");
 }
 
+TEST(Experiment, RobustAggregationIsSettings) {
+  EXPECT_EQ(gridExperiment().trim(), 0);
+  EXPECT_EQ(gridExperiment({"trim:=0.3"}).trim(), 0) << "the mean cuts nothing";
+  EXPECT_EQ(gridExperiment({"rule:=trimmed_mean"}).trim(), 0.2);
+  EXPECT_EQ(gridExperiment({"rule:=trimmed_mean", "trim:=0.3"}).trim(), 0.3);
+  EXPECT_EQ(gridExperiment({"rule:=median"}).trim(), 0.5);
+  EXPECT_EQ(refused({"rule:=median", "catch_up:=2"}),
+            "aggregation.rule median counts all tasks the same but aggregation.catch_up is 2: set "
+            "catch_up to 0, or rule to mean.");
+  EXPECT_EQ(refused({"outlier_factor:=0.5"}),
+            "aggregation.outlier_factor is 0.5 but must be at least 1, or 0 to leave none out.");
+  EXPECT_EQ(refused({"trim:=0.5"}),
+            "aggregation.trim is '0.5' (given as trim:=0.5) but must be a number, from 0 to below "
+            "0.5.");
+  EXPECT_EQ(refused({"rule:=mode"}),
+            "aggregation.rule is 'mode' (given as rule:=mode) but must be one of mean, median, "
+            "trimmed_mean.");
+}
+
+TEST(Experiment, TheKeyFileIsKeptAsAnAbsolutePath) {
+  EXPECT_EQ(gridExperiment().settings().key_file, "");
+  const test::ScopedVariable home("HOME", "/home/someone");
+  const Experiment experiment = gridExperiment({"key_file:=~/run.key"});
+  EXPECT_EQ(experiment.settings().key_file, "/home/someone/run.key");
+  EXPECT_NE(experiment.yaml().find("key_file: /home/someone/run.key"), std::string::npos);
+  EXPECT_EQ(gridExperiment({"key_file:=run.key"}).settings().key_file,
+            (std::filesystem::current_path() / "run.key").string());
+}
+
 TEST(Experiment, QuorumZeroMeansAll) {
   EXPECT_EQ(gridExperiment().quorum(), 5);
   EXPECT_EQ(gridExperiment({"quorum:=5"}).quorum(), 5);

@@ -55,6 +55,21 @@ TEST(LocalRunner, ResultsAreThePinnedOnes) {
   EXPECT_EQ(hexHash(run({"algorithm:=model_averaging"}).meta.checksum()), "0x0000000039216909");
 }
 
+TEST(LocalRunner, RoundsGoOnWithoutWhatIsLeftOut) {
+  const LocalResult all = run(), some = run({"outlier_factor:=1"}),
+                    none = run({"max_update_norm:=1e-9"});
+  ASSERT_EQ(some.rounds.size(), 10u);
+  const RoundSummary& first = some.rounds.front().summary;
+  EXPECT_FALSE(first.excluded.empty());
+  EXPECT_FALSE(first.participants.empty());
+  EXPECT_EQ(first.excluded.size() + first.participants.size(), 5u);
+  EXPECT_EQ(first.missing, std::vector<int>{});
+  EXPECT_EQ(some.rounds.front().rows.size(), all.rounds.front().rows.size());
+  EXPECT_FALSE(some.meta == all.meta);
+  EXPECT_EQ(none.rounds.back().summary.participants, std::vector<int>{});
+  EXPECT_EQ(none.meta.doubles(), std::vector<double>(none.meta.size(), 0.0));
+}
+
 TEST(LocalRunner, PmetaReachesTheOptimumWhereTasksAgree) {
   // the mean of -d(d-1)/2 over the five corner grids
   const double optimum = -14.442976190476191;

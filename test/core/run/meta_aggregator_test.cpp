@@ -236,5 +236,120 @@ TEST(MetaAggregator, WithBetaZeroNothingComesBack) {
   EXPECT_TRUE(aggregator.metaPolicy().model == before);
 }
 
+// the meta-policy moved by `distance` in one entry that the task owns
+std::shared_ptr<AuxiliaryUpdate> makeStep(const Experiment& experiment,
+                                          const MetaAggregator& aggregator, int task,
+                                          double distance) {
+  const MetaPolicy& meta = aggregator.metaPolicy();
+  auto update = makeUpdate(experiment, task, meta.round + 1);
+  const std::vector<std::uint8_t> present = update->model.present;
+  update->model = meta.model;
+  update->model.present = present;
+  update->model.doubles()[0] += distance;
+  // nobody owns what is not there
+  for (std::size_t k = 0; k < present.size(); ++k) {
+    if (present[k] == 0) update->model.doubles()[k] = 1e6;
+  }
+  return update;
+}
+
+TEST(MetaAggregator, MedianAndTrimmedMeanAreRules) {
+  for (const std::string rule : {"median", "trimmed_mean"}) {
+    const Experiment experiment =
+        gridExperiment({"sizes:=[3, 3, 3, 3, 3]", "rule:=" + rule, "trim:=0.2", "beta:=0.5"});
+    MetaAggregator aggregator(experiment);
+    int task = 0;
+    for (const double step : {4.0, 1.0, -1e9, 2.0, 1e9}) {
+      aggregator.offer(makeStep(experiment, aggregator, task++, step));
+    }
+    aggregator.closeRound();
+    const double expected = rule == "median" ? 2 : 7.0 / 3;
+    EXPECT_NEAR(aggregator.metaPolicy().model.doubles()[0], 0.5 * expected, 1e-12) << rule;
+    EXPECT_EQ(aggregator.metaPolicy().participants, (Tasks{0, 1, 2, 3, 4}));
+  }
+}
+
+TEST(MetaAggregator, RobustRulesTakeNoOtherWeightThanOne) {
+  const Experiment experiment = smallExperiment({"rule:=median"});
+  MetaAggregator aggregator(experiment);
+  const auto answer = aggregator.offer(makeUpdate(experiment, 1, 1, 2));
+  EXPECT_EQ(answer.verdict, Verdict::kRefused);
+  EXPECT_EQ(answer.reason,
+            "task 1 has weight 2 but aggregation.rule median counts all tasks the same: start it "
+            "with the same configuration.");
+  EXPECT_EQ(aggregator.counts()[1].last_reason, answer.reason);
+}
+
+TEST(MetaAggregator, LeavesOutWhatIsTooFarAndDoesNotWaitForIt) {
+  const Experiment experiment = smallExperiment({"max_update_norm:=10"});
+  MetaAggregator aggregator(experiment);
+  int task = 0;
+  for (const double step : {4.0, 10.5, 6.0}) {
+    EXPECT_EQ(aggregator.offer(makeStep(experiment, aggregator, task++, step)).verdict,
+              Verdict::kAccepted);
+  }
+  EXPECT_TRUE(aggregator.complete());
+  EXPECT_EQ(aggregator.closeRound(), Tasks{});
+  EXPECT_EQ(aggregator.metaPolicy().round, 1);
+  EXPECT_EQ(aggregator.metaPolicy().participants, (Tasks{0, 2}));
+  EXPECT_EQ(aggregator.metaPolicy().model.doubles()[0], 5);
+  EXPECT_EQ(aggregator.excluded(), Tasks{1});
+  EXPECT_EQ(aggregator.exclusions()[0].reason,
+            "its distance to the meta-policy, 10.5, is above aggregation.max_update_norm, 10");
+  EXPECT_EQ(aggregator.counts()[1].accepted, 1);
+  EXPECT_EQ(aggregator.counts()[1].excluded, 1);
+  EXPECT_EQ(aggregator.counts()[1].last_reason, aggregator.exclusions()[0].reason);
+  EXPECT_EQ(aggregator.counts()[0].excluded, 0);
+
+  // the next round begins with a clean slate, and norms from the new meta-policy
+  for (task = 0; task < 3; ++task) aggregator.offer(makeStep(experiment, aggregator, task, 9));
+  aggregator.closeRound();
+  EXPECT_EQ(aggregator.excluded(), Tasks{});
+  EXPECT_EQ(aggregator.metaPolicy().model.doubles()[0], 14);
+}
+
+TEST(MetaAggregator, WhatIsLeftOutDoesNotDependOnTheOrderOfArrival) {
+  const Experiment experiment = gridExperiment({"outlier_factor:=2"});
+  Tasks order = {0, 1, 2, 3, 4};
+  const std::vector<double> steps = {1, 2.5, 1.2, -1.1, 3};
+  std::mt19937 random(2);
+  for (int i = 0; i < 20; ++i) {
+    MetaAggregator aggregator(experiment);
+    for (const int task : order) {
+      aggregator.offer(makeStep(experiment, aggregator, task, steps[task]));
+    }
+    aggregator.closeRound();
+    EXPECT_EQ(aggregator.excluded(), (Tasks{1, 4})) << "the median is 1.2";
+    std::shuffle(order.begin(), order.end(), random);
+  }
+}
+
+TEST(MetaAggregator, IfAllAreLeftOutTheMetaPolicyStays) {
+  for (const std::string rule : {"mean", "median"}) {
+    const Experiment experiment = smallExperiment({"max_update_norm:=1", "rule:=" + rule});
+    MetaAggregator aggregator(experiment);
+    const Model before = aggregator.metaPolicy().model;
+    for (int task = 0; task < 3; ++task) {
+      aggregator.offer(makeStep(experiment, aggregator, task, 5));
+    }
+    aggregator.closeRound();
+    EXPECT_TRUE(aggregator.metaPolicy().model == before);
+    EXPECT_EQ(aggregator.metaPolicy().round, 1);
+    EXPECT_EQ(aggregator.metaPolicy().participants, Tasks{});
+    EXPECT_EQ(aggregator.excluded(), (Tasks{0, 1, 2}));
+  }
+}
+
+TEST(MetaAggregator, CountsRefusalsMadeBeforeTheOffer) {
+  MetaAggregator aggregator(smallExperiment());
+  aggregator.countRefusal(1, "a model's checksum does not fit.");
+  aggregator.countRefusal(3, "of nobody");
+  aggregator.countRefusal(-1, "of nobody");
+  EXPECT_EQ(aggregator.counts()[1].refused, 1);
+  EXPECT_EQ(aggregator.counts()[1].last_reason, "a model's checksum does not fit.");
+  EXPECT_EQ(aggregator.counts()[0].last_reason, "");
+  EXPECT_EQ(aggregator.refusedUnknown(), 2);
+}
+
 }  // namespace
 }  // namespace pmeta

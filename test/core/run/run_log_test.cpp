@@ -214,6 +214,20 @@ TEST(RoundBook, DoesWithoutThePersonalReturnOfAMissingTask) {
   EXPECT_EQ(rounds[0].rows.size(), 5u);
 }
 
+TEST(RoundBook, WaitsForThePersonalReturnOfAnExcludedTask) {
+  RoundBook book(threeTasks());
+  book.closeRound(1, {0, 2}, {}, 1, {1});
+  for (int task = 0; task < 3; ++task) book.add(makeReturn(1, task, Policy::kMeta));
+  for (const int task : {0, 2}) book.add(makeReturn(1, task, Policy::kPersonal));
+  EXPECT_EQ(book.awaited(), Tasks{1});
+  EXPECT_TRUE(book.take().empty());
+  book.add(makeReturn(1, 1, Policy::kPersonal));
+  const auto rounds = book.take();
+  ASSERT_EQ(rounds.size(), 1u);
+  EXPECT_EQ(rounds[0].summary.excluded, Tasks{1});
+  EXPECT_EQ(rounds[0].rows.size(), 6u);
+}
+
 TEST(RoundBook, ForcedRoundsComeOutAsTheyAre) {
   RoundBook book(threeTasks());
   book.closeRound(1, {0, 2}, {1}, 1);

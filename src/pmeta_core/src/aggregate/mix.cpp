@@ -3,15 +3,7 @@
 #include <algorithm>
 
 #include "pmeta_core/base/error.h"
-
-// one binary, the widest vectors of the machine it runs on; contraction is off, so all give equal
-// bits
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
-#define PMETA_VECTORISED __attribute__((target_clones("default", "avx2", "avx512f")))
-#else
-#define PMETA_VECTORISED
-#endif
+#include "vectorised.h"
 
 namespace pmeta {
 namespace {
@@ -110,12 +102,16 @@ void mixValues(std::vector<Scalar>& meta, const std::vector<Contribution>& contr
 
 }  // namespace
 
-void mixInto(Model& meta, const std::vector<Contribution>& contributions, double beta) {
+void requireMixable(const Model& meta, const std::vector<Contribution>& contributions) {
   for (const Contribution& one : contributions) {
     if (one.model->layout != meta.layout)
       throw Error("models of different layouts cannot be averaged.");
     if (!(one.weight > 0)) throw Error("the weight of a model in an average must be positive.");
   }
+}
+
+void mixInto(Model& meta, const std::vector<Contribution>& contributions, double beta) {
+  requireMixable(meta, contributions);
   if (contributions.empty()) return;
   std::visit(
       [&](auto& values) {

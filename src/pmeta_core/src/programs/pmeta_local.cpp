@@ -20,7 +20,9 @@
 #include "pmeta_core/env/model_check.h"
 #include "pmeta_core/env/tabular_env.h"
 #include "pmeta_core/env/trajectory_check.h"
+#include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/console.h"
+#include "pmeta_core/run/key_file.h"
 #include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/run/local_runner.h"
 #include "pmeta_core/run/sweep.h"
@@ -44,6 +46,7 @@ constexpr char kUsage[] =
                                        Run again to go on where it stopped.
   convergence CONFIG [key:=value ...]  measure the theory's statements on known models
   check CONFIG [key:=value ...]        check the settings and print the effective ones as YAML
+  key FILE                             make a key for key_file:=FILE; never overwrites
   settings [ENVIRONMENT]               list every setting with its meaning
   replay KIND FILE [--tasks FILE]      simulate recorded trajectories (CSV, also gzip) again and
                                        compare. KIND: ant, cartpole, half_cheetah, mountaincar,
@@ -217,6 +220,7 @@ int sweep(Arguments arguments) {
 int check(Arguments arguments) {
   const std::string config = takeConfig(arguments);
   const Experiment experiment = Experiment::load(config, arguments.words);
+  const pmeta::Authenticator probe(experiment.settings().key_file);
   printNotes(experiment);
   std::cout << experiment.yaml();
   return 0;
@@ -249,6 +253,14 @@ int convergence(Arguments arguments) {
   if (terminal) std::fprintf(stderr, "\r\033[K");
   pmeta::writeConvergence(report, dir);
   std::cout << pmeta::convergenceTable(report) << "results in " << dir << std::endl;
+  return 0;
+}
+
+int makeKey(const Arguments& arguments) {
+  if (arguments.words.size() != 1) throw Error("key needs the name of the file to make.");
+  const std::string& file = arguments.words.front();
+  pmeta::createKeyFile(file);
+  std::cout << "key file: " << file << std::endl;
   return 0;
 }
 
@@ -311,6 +323,7 @@ int dispatch(int argc, char** argv) {
   if (command == "sweep") return sweep(parseArguments(argc, argv));
   if (command == "convergence") return convergence(parseArguments(argc, argv));
   if (command == "check") return check(parseArguments(argc, argv));
+  if (command == "key") return makeKey(parseArguments(argc, argv));
   if (command == "settings") return settings(parseArguments(argc, argv));
   if (command == "replay") return replay(parseArguments(argc, argv));
   if (command == "evaluate") return evaluate(parseArguments(argc, argv));

@@ -78,6 +78,19 @@ std::vector<YAML::Node> choosePreset(YAML::Node base, const std::string& source,
               (known.empty() ? " has none." : " has " + join(known) + "."));
 }
 
+// nodes run in other working folders than the shell
+std::string absolutePath(const std::string& setting, std::string path) {
+  if (path == "~" || path.rfind("~/", 0) == 0) {
+    const std::string home = environmentVariable("HOME");
+    if (home.empty()) {
+      throw Error(setting + " is '" + path + "' but HOME is not set: give " + setting +
+                  (setting == "results_dir" ? ":=DIR." : ":=FILE."));
+    }
+    path = home + path.substr(1);
+  }
+  return std::filesystem::absolute(path).lexically_normal().string();
+}
+
 const std::vector<std::string> kLearners = {"q_learning", "dqn", "sac"};
 
 // six digits, so that a limit that is named is allowed
@@ -126,8 +139,8 @@ Experiment Experiment::resume(const std::string& run_dir,
 
 std::map<std::string, std::string> Experiment::definingSettings() const {
   std::map<std::string, std::string> settings = flatSettings(YAML::Load(yaml_));
-  for (const char* key : {"results_dir", "pace", "publish_trajectories", "checkpoint.interval",
-                          "aggregation.round_timeout"}) {
+  for (const char* key : {"results_dir", "pace", "publish_trajectories", "key_file",
+                          "checkpoint.interval", "aggregation.round_timeout"}) {
     settings.erase(key);
   }
   return settings;
@@ -166,6 +179,9 @@ void Experiment::bind(Settings& s) {
          Range::between(0, 3600));
   s.bind("publish_trajectories", e.publish_trajectories,
          "publish evaluation episodes for the viewer; false: no observation leaves an agent");
+  s.bind("key_file", e.key_file,
+         "over ROS: file with the key that messages are authenticated with (./pmeta key FILE); "
+         "\"\" for none");
   s.bind("fresh_episodes", e.fresh_episodes,
          "local runner: after the last round, evaluate the last and the best policies again, on so "
          "many fresh episodes a task",
@@ -196,6 +212,20 @@ void Experiment::bind(Settings& s) {
       "how much more a task counts while the meta-policy lags behind its personal policy; 0: all "
       "tasks count the same",
       Range::between(0, 10));
+  s.bind("aggregation.rule", e.aggregation.rule,
+         "what becomes of each entry: the weighted mean of all values, their median, or the mean "
+         "without those at both ends",
+         {"mean", "median", "trimmed_mean"});
+  s.bind("aggregation.trim", e.aggregation.trim,
+         "rule trimmed_mean: share of the values that is cut at each end", Range::halfOpen(0, 0.5));
+  s.bind("aggregation.max_update_norm", e.aggregation.max_update_norm,
+         "an update further than this from the meta-policy it began with (Euclidean) is left out; "
+         "0: none is",
+         Range::atLeast(0));
+  s.bind("aggregation.outlier_factor", e.aggregation.outlier_factor,
+         "an update further than this times the median of the round's distances is left out, where "
+         "there are three or more; 0: none is",
+         Range::atLeast(0));
 
   s.bind("environment.name", e.environment, "family of environments", envFamilyNames());
   family_->bind(s);
@@ -247,8 +277,10 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
     throw Error("sac.exploration_episodes must be ascending, e.g. [5, 15].");
   }
   experiment.applyAlgorithm();
+  experiment.checkAggregation();
   experiment.checkStability();
   e.results_dir = expandResultsDir(e.results_dir);
+  if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
   if (e.run_id.empty()) {
     e.run_id = utcStamp() + "_" + e.algorithm + "_seed" + std::to_string(e.seed);
   }
@@ -291,6 +323,19 @@ void Experiment::applyAlgorithm() {
   }
   if (!changes.empty())
     notes_.push_back("algorithm " + e.algorithm + " sets " + join(changes) + ".");
+}
+
+void Experiment::checkAggregation() const {
+  const AggregationSettings& a = settings_.aggregation;
+  if (a.rule != "mean" && a.catch_up > 0) {
+    throw Error("aggregation.rule " + a.rule + " counts all tasks the same but " +
+                "aggregation.catch_up is " + formatNumber(a.catch_up) +
+                ": set catch_up to 0, or rule to mean.");
+  }
+  if (a.outlier_factor > 0 && a.outlier_factor < 1) {
+    throw Error("aggregation.outlier_factor is " + formatNumber(a.outlier_factor) +
+                " but must be at least 1, or 0 to leave none out.");
+  }
 }
 
 void Experiment::checkStability() {
@@ -345,6 +390,12 @@ int Experiment::quorum() const {
   return settings_.aggregation.quorum == 0 ? numTasks() : settings_.aggregation.quorum;
 }
 
+double Experiment::trim() const {
+  const AggregationSettings& a = settings_.aggregation;
+  if (a.rule == "mean") return 0;
+  return a.rule == "median" ? 0.5 : a.trim;
+}
+
 std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
   const ExperimentSettings& e = settings_;
   if (e.learner != "q_learning") {
@@ -397,22 +448,16 @@ std::string Experiment::runDir() const {
 }
 
 std::string expandResultsDir(const std::string& results_dir) {
-  const std::string home = environmentVariable("HOME");
   std::string dir = results_dir;
   if (dir.empty()) {
+    const std::string home = environmentVariable("HOME");
     const std::string ros_home = environmentVariable("ROS_HOME");
     if (ros_home.empty() && home.empty()) {
       throw Error("results_dir is not given and HOME is not set: give results_dir:=DIR.");
     }
     dir = (ros_home.empty() ? home + "/.ros" : ros_home) + "/pmeta";
-  } else if (dir == "~" || dir.rfind("~/", 0) == 0) {
-    if (home.empty()) {
-      throw Error("results_dir is '" + dir + "' but HOME is not set: give results_dir:=DIR.");
-    }
-    dir = home + dir.substr(1);
   }
-  // nodes run in other working folders than the shell
-  return std::filesystem::absolute(dir).lexically_normal().string();
+  return absolutePath("results_dir", dir);
 }
 
 void requireWritable(const std::string& dir) {

@@ -44,7 +44,8 @@ class LocalRun {
     }
     const std::vector<int> missing = aggregator_.closeRound();
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    book_.closeRound(round, aggregator_.metaPolicy().participants, missing, seconds.count());
+    book_.closeRound(round, aggregator_.metaPolicy().participants, missing, seconds.count(),
+                     aggregator_.excluded());
   }
 
   // the record of the round that has been trained, once the meta-policy is evaluated

@@ -1,15 +1,19 @@
 #include "pmeta_core/run/meta_aggregator.h"
 
 #include "pmeta_core/aggregate/mix.h"
+#include "pmeta_core/aggregate/trimmed_mix.h"
 #include "pmeta_core/base/error.h"
 
 namespace pmeta {
 
 MetaAggregator::MetaAggregator(const Experiment& experiment)
-    : beta_(experiment.settings().aggregation.beta),
-      rounds_(experiment.settings().rounds),
+    : rounds_(experiment.settings().rounds),
+      settings_(experiment.settings().aggregation),
+      trim_(experiment.trim()),
+      bound_{settings_.max_update_norm, settings_.outlier_factor},
       quorum_(experiment.quorum()),
       updates_(experiment.numTasks()),
+      norms_(experiment.numTasks(), 0),
       counts_(experiment.numTasks()) {
   meta_.run_id = experiment.settings().run_id;
   meta_.model = experiment.makeLearner(0)->initialModel(
@@ -18,10 +22,9 @@ MetaAggregator::MetaAggregator(const Experiment& experiment)
 
 MetaAggregator::Answer MetaAggregator::offer(std::shared_ptr<const AuxiliaryUpdate> update) {
   const int task = update->task;
-  const bool known = task >= 0 && task < static_cast<int>(updates_.size());
   const std::string reason = refusal(*update);
   if (!reason.empty()) {
-    ++(known ? counts_[task].refused : refused_unknown_);
+    countRefusal(task, reason);
     return {Verdict::kRefused, reason};
   }
   if (update->round <= meta_.round) {
@@ -33,8 +36,18 @@ MetaAggregator::Answer MetaAggregator::offer(std::shared_ptr<const AuxiliaryUpda
     return {Verdict::kDuplicate, "this round already has an update of the task."};
   }
   ++counts_[task].accepted;
+  if (bound_.bounds()) norms_[task] = distance(update->model, meta_.model);
   updates_[task] = std::move(update);
   return {};
+}
+
+void MetaAggregator::countRefusal(int task, const std::string& reason) {
+  if (task < 0 || task >= static_cast<int>(counts_.size())) {
+    ++refused_unknown_;
+    return;
+  }
+  ++counts_[task].refused;
+  counts_[task].last_reason = reason;
 }
 
 std::string MetaAggregator::refusal(const AuxiliaryUpdate& update) const {
@@ -51,6 +64,10 @@ std::string MetaAggregator::refusal(const AuxiliaryUpdate& update) const {
   }
   if (!(update.weight > 0) || update.weight > 1e12) {
     return who + " has weight " + formatNumber(update.weight) + ", which is not a positive number.";
+  }
+  if (settings_.rule != "mean" && update.weight != 1) {
+    return who + " has weight " + formatNumber(update.weight) + " but aggregation.rule " +
+           settings_.rule + " counts all tasks the same: start it with the same configuration.";
   }
   try {
     checkModel(update.model, meta_.model.layout, who);
@@ -78,13 +95,23 @@ std::vector<int> MetaAggregator::missing() const {
 
 std::vector<int> MetaAggregator::closeRound() {
   const std::vector<int> absent = missing();
-  std::vector<Contribution> contributions;
-  for (const auto& update : updates_) {
-    if (update) contributions.push_back({&update->model, update->weight});
+  if (absent.size() == updates_.size()) throw std::logic_error("closing a round without updates");
+  exclusions_ = findExclusions();
+  for (const Exclusion& exclusion : exclusions_) {
+    ++counts_[exclusion.task].excluded;
+    counts_[exclusion.task].last_reason = exclusion.reason;
+    updates_[exclusion.task].reset();
   }
-  if (contributions.empty()) throw std::logic_error("closing a round without updates");
-  mixInto(meta_.model, contributions, beta_);
   meta_.participants = reported();
+  std::vector<Contribution> contributions;
+  for (const int task : meta_.participants) {
+    contributions.push_back({&updates_[task]->model, updates_[task]->weight});
+  }
+  if (settings_.rule == "mean") {
+    mixInto(meta_.model, contributions, settings_.beta);
+  } else {
+    mixTrimmedInto(meta_.model, contributions, settings_.beta, trim_);
+  }
   ++meta_.round;
   for (auto& update : updates_) update.reset();
   return absent;
@@ -98,7 +125,7 @@ void MetaAggregator::saveState(StateWriter& writer) const {
   writer.array("participants", participants);
   std::vector<std::int64_t> counts;
   for (const Counts& c : counts_) {
-    counts.insert(counts.end(), {c.accepted, c.duplicate, c.stale, c.refused});
+    counts.insert(counts.end(), {c.accepted, c.duplicate, c.stale, c.refused, c.excluded});
   }
   writer.array("counts", counts);
   writer.count("refused_unknown", refused_unknown_);
@@ -113,14 +140,33 @@ void MetaAggregator::loadState(StateReader& reader) {
   for (std::size_t task = 0; task < participants.size(); ++task) {
     if (participants[task] != 0) meta_.participants.push_back(static_cast<int>(task));
   }
-  std::vector<std::int64_t> counts(4 * counts_.size());
+  std::vector<std::int64_t> counts(5 * counts_.size());
   reader.counts("counts", counts);
   for (std::size_t task = 0; task < counts_.size(); ++task) {
-    const std::int64_t* c = &counts[4 * task];
-    counts_[task] = {c[0], c[1], c[2], c[3]};
+    const std::int64_t* c = &counts[5 * task];
+    counts_[task] = {c[0], c[1], c[2], c[3], c[4], ""};
   }
   refused_unknown_ = reader.count("refused_unknown");
+  exclusions_.clear();
   for (auto& update : updates_) update.reset();
+}
+
+std::vector<MetaAggregator::Exclusion> MetaAggregator::findExclusions() const {
+  const std::vector<int> tasks = reported();
+  std::vector<double> norms;
+  for (const int task : tasks) norms.push_back(norms_[task]);
+  const std::vector<std::string> objections = bound_.objections(norms);
+  std::vector<Exclusion> found;
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    if (!objections[i].empty()) found.push_back({tasks[i], objections[i]});
+  }
+  return found;
+}
+
+std::vector<int> MetaAggregator::excluded() const {
+  std::vector<int> tasks;
+  for (const Exclusion& exclusion : exclusions_) tasks.push_back(exclusion.task);
+  return tasks;
 }
 
 }  // namespace pmeta

@@ -67,6 +67,7 @@ void RoundSummary::saveState(StateWriter& writer) const {
   writer.count("round", round);
   writer.array("participants", tasksOf(participants));
   writer.array("missing", tasksOf(missing));
+  writer.array("excluded", tasksOf(excluded));
   writer.value("seconds", seconds);
 }
 
@@ -74,6 +75,7 @@ void RoundSummary::loadState(StateReader& reader) {
   round = static_cast<int>(reader.count("round", 0, kMostRounds));
   participants = readTasks(reader, "participants");
   missing = readTasks(reader, "missing");
+  excluded = readTasks(reader, "excluded");
   seconds = reader.value<double>("seconds");
 }
 

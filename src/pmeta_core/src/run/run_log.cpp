@@ -87,7 +87,8 @@ bool RoundBook::add(const TaskReturn& result) {
 }
 
 void RoundBook::closeRound(int round, const std::vector<int>& participants,
-                           const std::vector<int>& missing, double seconds) {
+                           const std::vector<int>& missing, double seconds,
+                           const std::vector<int>& excluded) {
   Open& open = open_[round];
   open.closed = true;
   open.summary.run_id = run_id_;
@@ -95,11 +96,19 @@ void RoundBook::closeRound(int round, const std::vector<int>& participants,
   open.summary.rounds = rounds_;
   open.summary.participants = participants;
   open.summary.missing = missing;
+  open.summary.excluded = excluded;
   open.summary.seconds = seconds;
 }
 
 bool RoundBook::Open::hasPersonal(int task) const {
   return results.count({static_cast<int>(Policy::kPersonal), task, 0}) != 0;
+}
+
+bool RoundBook::Open::reported(int task) const {
+  const auto holds = [task](const std::vector<int>& tasks) {
+    return std::find(tasks.begin(), tasks.end(), task) != tasks.end();
+  };
+  return holds(summary.participants) || holds(summary.excluded);
 }
 
 bool RoundBook::Open::hasMeta(int task, const std::vector<int>& contexts) const {
@@ -111,8 +120,8 @@ bool RoundBook::Open::hasMeta(int task, const std::vector<int>& contexts) const 
 bool RoundBook::isComplete(int round, const Open& open) const {
   if (!open.closed) return false;
   if (!evaluations_.includes(round)) return true;
-  for (const int task : open.summary.participants) {
-    if (!open.hasPersonal(task)) return false;
+  for (int task = 0; task < num_tasks_; ++task) {
+    if (open.reported(task) && !open.hasPersonal(task)) return false;
   }
   for (int task = 0; expects_meta_ && task < total_tasks_; ++task) {
     if (!open.hasMeta(task, contexts_)) return false;
@@ -165,9 +174,7 @@ std::vector<int> RoundBook::awaited() const {
   // a closed round does without the personal returns of those it missed
   const auto owesPersonal = [&](int task) {
     if (task >= num_tasks_) return false;
-    if (it == open_.end() || !it->second.closed) return true;
-    const std::vector<int>& all = it->second.summary.participants;
-    return std::find(all.begin(), all.end(), task) != all.end();
+    return it == open_.end() || !it->second.closed || it->second.reported(task);
   };
   for (int task = 0; task < total_tasks_; ++task) {
     const bool none = it == open_.end();
@@ -210,10 +217,11 @@ void RoundBook::loadState(StateReader& reader) {
       return tasks.empty() || tasks.back() < num_tasks_;  // ascending
     };
     if (summary.round < next_ || summary.round > rounds_ || !known(summary.participants) ||
-        !known(summary.missing)) {
+        !known(summary.missing) || !known(summary.excluded)) {
       reader.refuse("closed_" + std::to_string(k), "is no open round of this run");
     }
-    closeRound(summary.round, summary.participants, summary.missing, summary.seconds);
+    closeRound(summary.round, summary.participants, summary.missing, summary.seconds,
+               summary.excluded);
   }
   const std::int64_t returns = reader.count("returns");
   for (std::int64_t k = 0; k < returns; ++k) {

@@ -12,6 +12,9 @@ struct Contribution {
   double weight = 1;             ///< positive
 };
 
+/// Throws Error unless all contributions have the meta model's layout and positive weights.
+void requireMixable(const Model& meta, const std::vector<Contribution>& contributions);
+
 /// meta <- (1 - beta) * meta + beta * weighted mean of the contributions: eqs. (global_update0) and
 /// (global_update).
 ///

@@ -19,10 +19,14 @@ namespace pmeta {
 
 /// How the meta-aggregator mixes and how long it waits.
 struct AggregationSettings {
-  double beta = 1;            ///< mixing: meta <- (1 - beta) meta + beta mean
-  int quorum = 0;             ///< updates that suffice once round_timeout has passed; 0 means all
-  double round_timeout = 30;  ///< seconds before a round counts as late
-  double catch_up = 0;        ///< how much more tasks count on which the meta-policy lags
+  double beta = 1;             ///< mixing: meta <- (1 - beta) meta + beta mean
+  int quorum = 0;              ///< updates that suffice once round_timeout has passed; 0 means all
+  double round_timeout = 30;   ///< seconds before a round counts as late
+  double catch_up = 0;         ///< how much more tasks count on which the meta-policy lags
+  std::string rule = "mean";   ///< mean, median or trimmed_mean of each entry
+  double trim = 0.2;           ///< with trimmed_mean: share of values cut at each end
+  double max_update_norm = 0;  ///< updates further from the meta-policy are left out; 0: none
+  double outlier_factor = 0;   ///< as are those of more than this times the median; 0: none
 };
 
 /// The rounds in which policies are evaluated: every `interval`-th, and the last.
@@ -48,6 +52,7 @@ struct ExperimentSettings {
   double pace = 0;              ///< least seconds between rounds, to watch a fast experiment
   bool publish_trajectories = true;
   int checkpoint_interval = 0;  ///< rounds from one checkpoint to the next; 0: none
+  std::string key_file;         ///< of the key that messages are authenticated with; "" for none
   int fresh_episodes = 0;       ///< local runner: episodes of the evaluation after the last round
   PersonalSettings personal;
   QLearningSettings q_learning;  ///< with learner q_learning
@@ -100,6 +105,9 @@ class Experiment {
     return {settings_.evaluation_interval, settings_.rounds};
   }
   int quorum() const;  ///< updates needed once the deadline has passed
+  /// The share of an entry's values that aggregation.rule cuts at each end: 0 for the mean, 0.5 for
+  /// the median.
+  double trim() const;
 
   /// How many exploration episodes the meta-policy is evaluated after, ascending; {0} without an
   /// inference network.
@@ -137,6 +145,7 @@ class Experiment {
   void bind(Settings& settings);
   void bindLearner(Settings& settings);
   void applyAlgorithm();
+  void checkAggregation() const;
   void checkStability();
 
   ExperimentSettings settings_;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pmeta_core/aggregate/norm_bound.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/protocol.h"
 
@@ -29,6 +30,13 @@ class MetaAggregator {
     std::int64_t duplicate = 0;
     std::int64_t stale = 0;
     std::int64_t refused = 0;
+    std::int64_t excluded = 0;  ///< of those accepted: left out when the round was closed
+    std::string last_reason;    ///< of the newest update that was refused or left out; "" if none
+  };
+  /// An update that came but was left out of an aggregation.
+  struct Exclusion {
+    int task = 0;
+    std::string reason;  ///< a clause: "its distance to the meta-policy, 812, is above ..."
   };
 
   explicit MetaAggregator(const Experiment& experiment);
@@ -44,9 +52,17 @@ class MetaAggregator {
   bool complete() const { return missing().empty(); }
   bool hasQuorum() const { return static_cast<int>(reported().size()) >= quorum_; }
 
-  /// Mixes what has been reported, in task order, and begins the next round.
+  /// Mixes what has been reported, in task order, without what the settings' NormBound objects to,
+  /// and begins the next round; if nothing is left the meta-policy stays as it is.
   /// Returns the tasks that were missing. Needs at least one update.
   std::vector<int> closeRound();
+
+  /// Whom the last closed round left out, in task order.
+  const std::vector<Exclusion>& exclusions() const { return exclusions_; }
+  std::vector<int> excluded() const;  ///< their tasks
+
+  /// Counts an update that could not even be offered; `task` is whose it claims to be.
+  void countRefusal(int task, const std::string& reason);
 
   /// Meta-policy, round, participants and counts; what has been reported for the open round is left
   /// out: agents send it again.
@@ -58,12 +74,17 @@ class MetaAggregator {
 
  private:
   std::string refusal(const AuxiliaryUpdate& update) const;
+  std::vector<Exclusion> findExclusions() const;
 
-  double beta_;
   int rounds_;
+  AggregationSettings settings_;
+  double trim_;
+  NormBound bound_;
   int quorum_;
   MetaPolicy meta_;
   std::vector<std::shared_ptr<const AuxiliaryUpdate>> updates_;  ///< by task; null: missing
+  std::vector<double> norms_;  ///< of the updates, by task, where bound_ asks for them
+  std::vector<Exclusion> exclusions_;
   std::vector<Counts> counts_;
   std::int64_t refused_unknown_ = 0;
 };

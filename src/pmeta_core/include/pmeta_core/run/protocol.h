@@ -63,11 +63,12 @@ struct RoundSummary {
   double meta_return = 0;      ///< MP: the same, after adaptation; NaN if none
   double test_return = 0;      ///< of the meta-policy on test tasks, after adaptation; NaN if none
   std::vector<int> participants;
-  std::vector<int> missing;  ///< tasks whose update this round did without
-  double seconds = 0;        ///< from the meta-policy's publication to the aggregation
-  double eta_seconds = 0;    ///< estimate until the last round
+  std::vector<int> missing;   ///< tasks whose update this round did without
+  std::vector<int> excluded;  ///< tasks whose update came but was left out of the aggregation
+  double seconds = 0;         ///< from the meta-policy's publication to the aggregation
+  double eta_seconds = 0;     ///< estimate until the last round
 
-  /// What is known when the round closes: round, participants, missing and seconds.
+  /// What is known when the round closes: round, participants, missing, excluded and seconds.
   void saveState(StateWriter& writer) const;
   void loadState(StateReader& reader);
 };

@@ -34,10 +34,10 @@ class RoundBook {
   /// False if the return is a duplicate, of a round given out already, or of no task of this run.
   bool add(const TaskReturn& result);
 
-  /// Round `round` has been aggregated: personal returns of its participants and meta returns of
-  /// all tasks are due.
+  /// Round `round` has been aggregated: personal returns of its participants and of the excluded,
+  /// and meta returns of all tasks are due.
   void closeRound(int round, const std::vector<int>& participants, const std::vector<int>& missing,
-                  double seconds);
+                  double seconds, const std::vector<int>& excluded = {});
 
   /// Rounds that are complete, in order; those that do not evaluate have no rows. With `force`,
   /// closed rounds come out as they are.
@@ -61,6 +61,7 @@ class RoundBook {
     std::map<std::tuple<int, int, int>, TaskReturn> results;  ///< by policy, task, context
 
     bool hasPersonal(int task) const;
+    bool reported(int task) const;
     bool hasMeta(int task, const std::vector<int>& contexts) const;
   };
   bool isComplete(int round, const Open& open) const;
