@@ -226,7 +226,8 @@ void RunPanel::showButtons(const RunState& state) {
   showButton(pause_, Request::kPause, state.active(),
              paused ? "let the next meta-policy go out"
                     : "hold the next meta-policy back; the result stays the same");
-  showButton(evaluate_, Request::kEvaluate, state.active(), "evaluate the policies as they are");
+  showButton(evaluate_, Request::kEvaluate, state.active(),
+             "evaluate the next meta-policy, whatever the schedule; the result stays the same");
   showButton(checkpoint_, Request::kCheckpoint, state.active(), "save the run as it is");
 }
 
