@@ -111,8 +111,8 @@ TEST_F(SparsePointSceneTest, ActionValuesAreAMapWithTheActionTaken) {
   EXPECT_LT(cells.points[7].x, cells.points[8].x);
   EXPECT_LT(cells.points[5].y, cells.points[8].y);
   EXPECT_GT(cells.points[0].x, 1.25 * scale()) << "beside the plane";
-  EXPECT_EQ("7.00", find(scene, "action value texts", 4).text);
-  EXPECT_EQ("-2.00", find(scene, "action value texts", 5).text);
+  EXPECT_EQ("7", find(scene, "action value texts", 4).text);
+  EXPECT_EQ("-2", find(scene, "action value texts", 5).text);
 
   // the dot's middle: in the last column, between the first and second row
   double x = 0, y = 0, n = 0;

@@ -1,6 +1,8 @@
 #include "action_value_map.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 
 namespace pmeta_nodes {
 
@@ -20,7 +22,7 @@ constexpr double kDotLayer = 0.15;
 constexpr double kTick = 0.06;
 constexpr double kKeyGap = 0.08;
 constexpr double kKeyWidth = 0.09;
-constexpr double kNumberWidth = 0.5;
+constexpr double kNumberWidth = 0.75;
 constexpr int kKeyParts = 16;
 
 /// Values of one map, thinned out to the cells that are drawn.
@@ -61,6 +63,12 @@ class Values {
   double low_, high_;
 };
 
+std::string threeDigits(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
 /// One point for each cell: a tenth of what its triangles would take.
 Marker cellMarker(const ActionValuePlace& place, int id, const Values* values) {
   Marker marker = makeMarker(place.frame, "action values", id);
@@ -69,7 +77,8 @@ Marker cellMarker(const ActionValuePlace& place, int id, const Values* values) {
   marker.action = values == nullptr ? Marker::DELETE : Marker::ADD;
   if (values == nullptr) return marker;
   const double size = place.side / values->cells();
-  marker.scale.x = marker.scale.y = size;
+  // rviz leaves gaps between squares that only just touch
+  marker.scale.x = marker.scale.y = 1.1 * size;
   for (int row = 0; row < values->cells(); ++row) {
     for (int column = 0; column < values->cells(); ++column) {
       geometry_msgs::Point point;
@@ -123,8 +132,8 @@ void drawActionValues(const ActionValuePlace& place, int task, int policy, const
   Figure axes(place.frame, "action value axes", id, kAxesLayer);
   if (shown) {
     const Values values(*view.episode, place.cells);
-    low = number(values.low());
-    high = number(values.high());
+    low = threeDigits(values.low());
+    high = threeDigits(values.high());
     scene.markers.push_back(cellMarker(place, id, &values));
     drawAxes(axes, place, values, policyColor(policy));
     drawAction(axes, place, values, *view.episode, policyColor(policy));

@@ -19,7 +19,7 @@ struct ActionValuePlace {
 };
 
 /// A map's width with key and numbers is its side and that many of it.
-constexpr double kActionValueKey = 0.72;
+constexpr double kActionValueKey = 0.95;
 
 /// A policy's action values at the start of its episode (Trajectory::action_values): a square of
 /// colours, from the lowest to the highest value of the map, with ticks at -1, 0 and 1 along both

@@ -24,7 +24,7 @@ constexpr double kTop = 1.3;
 
 // the maps of action values, beside it: personal above meta
 constexpr double kMapGap = 0.14;
-constexpr double kLargestMap = 0.72;
+constexpr double kLargestMap = 0.68;
 constexpr double kMaps = kMapGap + (1 + kActionValueKey) * kLargestMap;
 constexpr double kMostCells = 30000;  // of all maps
 

@@ -128,6 +128,9 @@ void RunPanel::build() {
   auto* buttons = new QHBoxLayout;
   for (QPushButton* button : {pause_, evaluate_, checkpoint_}) buttons->addWidget(button);
   answer_ = addLabel("answer", kFaintStyle);
+  // an answer must not push the buttons away from under the mouse
+  answer_->setMinimumHeight(2 * answer_->fontMetrics().lineSpacing());
+  answer_->setAlignment(Qt::AlignTop);
 
   auto* all = new QVBoxLayout(this);
   all->addLayout(head);
