@@ -36,7 +36,8 @@ def generated(definition):
         "pmeta_msgs/TaskReturn"]
 
 
-def write_bag(path, folder, message_class, keep=lambda row: True, run_id="r", twice=False):
+def write_bag(path, folder, message_class, keep=lambda row: True, run_id="r", twice=False,
+              asked=False):
     """The returns of a run folder as the agents publish them, in an order of their own."""
     with open(os.path.join(folder, "rounds.csv")) as file:
         rows = [row for row in csv.DictReader(file) if keep(row)]
@@ -45,10 +46,15 @@ def write_bag(path, folder, message_class, keep=lambda row: True, run_id="r", tw
             message = message_class(run_id=run_id, task=int(row["task"]), round=int(row["round"]),
                                     policy_name=row["policy"], split_name=row["split"],
                                     return_mean=float(row["return_mean"]))
-            # older messages have no such field
+            # older messages have no such fields
             if hasattr(message, "context_episodes"):
                 message.context_episodes = int(row["context_episodes"])
+            if hasattr(message, "scheduled"):
+                message.scheduled = True
             bag.write("/pmeta/returns", message, genpy.Time(i + 1))
+            if asked:
+                message.scheduled, message.round = False, message.round + 100
+                bag.write("/pmeta/returns", message, genpy.Time(i + 1, 1))
             if twice:
                 message.return_mean = 1e6
                 bag.write("/pmeta/returns", message, genpy.Time(i + 1, 1))
@@ -64,6 +70,12 @@ def test_curves_of_a_bag_equal_those_of_rounds_csv(tmp_path, message_class):
     for policy in ("personal", "meta"):
         assert list(run.curves[policy]) == list(of_folder.curves[policy])
         assert list(run.curves[policy]) == pytest.approx(curve(folder, policy), rel=1e-14)
+
+
+def test_returns_outside_the_schedule_are_left_out(tmp_path, message_class):
+    folder = write_run(tmp_path, seed=3)
+    [run] = pb.read_bag(write_bag(tmp_path / "r.bag", folder, message_class, asked=True))
+    assert list(run.rounds) == list(pr.load_runs([folder])[0].rounds)
 
 
 def test_the_figure_shows_both_policies(tmp_path, message_class):
@@ -95,8 +107,9 @@ def test_test_tasks_and_adaptation_equal_those_of_rounds_csv(tmp_path, message_c
 
 
 def test_older_bags_lack_context_episodes(tmp_path, definition):
-    older = generated(definition.replace("uint32 context_episodes", ""))
-    assert not hasattr(older(), "context_episodes")
+    older = generated(definition.replace("uint32 context_episodes", "").replace("bool scheduled",
+                                                                                ""))
+    assert not hasattr(older(), "context_episodes") and not hasattr(older(), "scheduled")
     folder = write_run(tmp_path, seed=3)
     [run] = pb.read_bag(write_bag(tmp_path / "r.bag", folder, older))
     for policy in ("personal", "meta"):

@@ -56,12 +56,13 @@ TEST(Conversions, ModelsKeepEveryBit) {
 }
 
 TEST(Conversions, MetaPolicyRoundTrip) {
-  const pmeta::MetaPolicy meta = {"run", 3, networkModel(), {0, 2}};
+  const pmeta::MetaPolicy meta = {"run", 3, networkModel(), {0, 2}, true};
   const pmeta_msgs::MetaPolicy msg = overTheWire(toMsg(meta, 10));
   EXPECT_EQ(msg.rounds, 10u);
   const pmeta::MetaPolicy back = fromMsg(msg);
   EXPECT_EQ(back.run_id, "run");
   EXPECT_EQ(back.round, 3);
+  EXPECT_TRUE(back.evaluate);
   EXPECT_EQ(back.participants, (std::vector<int>{0, 2}));
   EXPECT_TRUE(back.model == meta.model);
 }
@@ -91,6 +92,7 @@ TEST(Conversions, TaskReturnRoundTrip) {
       result.env_steps = 1LL << 40;
       result.updates = 30;
       result.seconds = 0.125;
+      result.scheduled = policy == pmeta::Policy::kMeta;
       const pmeta_msgs::TaskReturn msg = overTheWire(toMsg(result, "grid_4x4"));
       EXPECT_EQ(msg.task_name, "grid_4x4");
       EXPECT_EQ(msg.policy_name, pmeta::name(policy));
@@ -107,6 +109,7 @@ TEST(Conversions, TaskReturnRoundTrip) {
       EXPECT_EQ(back.env_steps, result.env_steps);
       EXPECT_EQ(back.updates, result.updates);
       EXPECT_EQ(back.seconds, result.seconds);
+      EXPECT_EQ(back.scheduled, result.scheduled);
     }
   }
 }
@@ -124,6 +127,8 @@ TEST(Conversions, TrajectoriesCarryTheEpisodeAndItsTask) {
   episode.truncated = true;
   episode.state_values = {-1, -2};
   episode.greedy_actions = {3, -1};
+  episode.action_grid = 2;
+  episode.action_values = {0.1f, 0.2f, -3, 4};
   const pmeta_msgs::Trajectory msg =
       overTheWire(toMsg(episode, experiment, 1, 4, pmeta::Policy::kMeta));
   EXPECT_EQ(msg.run_id, "r");
@@ -140,6 +145,8 @@ TEST(Conversions, TrajectoriesCarryTheEpisodeAndItsTask) {
   EXPECT_EQ(msg.positions, episode.positions);
   EXPECT_EQ(msg.state_values, episode.state_values);
   EXPECT_EQ(msg.greedy_actions, episode.greedy_actions);
+  EXPECT_EQ(msg.action_grid, 2u);
+  EXPECT_EQ(msg.action_values, episode.action_values);
   EXPECT_EQ(msg.episode_return, -5);
   EXPECT_FALSE(msg.terminated);
   EXPECT_TRUE(msg.truncated);

@@ -258,7 +258,7 @@ TEST_F(RunPanelTest, ButtonsCallTheServicesThatAreThere) {
   EXPECT_EQ(button("pause")->text().toStdString(), "Pause");
   EXPECT_FALSE(button("evaluate")->isEnabled());
   EXPECT_EQ(button("evaluate")->toolTip().toStdString(),
-            "the run does not offer the service /pmeta/evaluate_now");
+            "the run does not offer the service /pmeta/evaluate");
   EXPECT_FALSE(button("checkpoint")->isEnabled());
 
   button("pause")->click();
@@ -280,6 +280,20 @@ TEST_F(RunPanelTest, ButtonsCallTheServicesThatAreThere) {
   ASSERT_TRUE(waitFor([&] { return button("checkpoint")->isEnabled(); }));
   button("checkpoint")->click();
   EXPECT_TRUE(waitFor([&] { return label("answer") == "the disk is full"; }));
+
+  std::atomic<int> evaluations{0};
+  const boost::function<bool(std_srvs::Trigger::Request&, std_srvs::Trigger::Response&)>
+      on_evaluate = [&](std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+        ++evaluations;
+        response.success = 1;
+        response.message = "the next meta-policy is evaluated";
+        return true;
+      };
+  const ros::ServiceServer evaluate = nh_.advertiseService("evaluate", on_evaluate);
+  ASSERT_TRUE(waitFor([&] { return button("evaluate")->isEnabled(); }));
+  button("evaluate")->click();
+  EXPECT_TRUE(waitFor([&] { return label("answer") == "the next meta-policy is evaluated"; }));
+  EXPECT_EQ(evaluations, 1);
 }
 
 TEST_F(RunPanelTest, AServiceThatHangsHoldsUpNothing) {

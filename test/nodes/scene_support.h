@@ -81,7 +81,8 @@ inline std::string complaint(const Scene& scene, const MarkerArray& markers) {
     const double norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
     if (!(norm > 0.999 && norm < 1.001)) return name + " has no orientation";
     if (marker.action == Marker::DELETE) continue;
-    if (!(marker.color.a > 0) || !(marker.scale.z > 0 || marker.type == Marker::LINE_STRIP)) {
+    if (!(marker.color.a > 0) || !(marker.scale.z > 0 || marker.type == Marker::LINE_STRIP ||
+                                   marker.type == Marker::POINTS)) {
       return name + " has no colour or size";
     }
     if (marker.type == Marker::TEXT_VIEW_FACING && marker.text.empty()) return name + " is empty";

@@ -16,7 +16,7 @@ NEEDS = {"curves": "it has no finished run",
          "sweep": "no numeric setting of pMeta-RL differs between its runs",
          "tasks": "it has neither networks nor fresh episodes",
          "unseen": "it has neither test tasks nor an inference network",
-         "values": "it has no run of mountain_car with policies",
+         "values": "it has no run of mountain_car or sparse_point_robot with policies",
          "convergence": "it has no finished convergence run"}
 FORMATS = ("png", "pdf")
 

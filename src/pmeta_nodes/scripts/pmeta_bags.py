@@ -70,7 +70,9 @@ def _runs_of(path, bag):
                         % (path, TYPE, ", ".join(sorted(topics)) or "none"))
     runs = {}
     for _, message, _ in bag.read_messages(topics=chosen):
-        # bags of older runs lack the field
+        # bags of older runs lack these fields
+        if not getattr(message, "scheduled", True):
+            continue
         key = key_of(message.policy_name, message.split_name,
                      getattr(message, "context_episodes", 0))
         by_task = runs.setdefault(message.run_id, {}).setdefault(key, {}).setdefault(

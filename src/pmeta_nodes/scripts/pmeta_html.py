@@ -75,6 +75,8 @@ CAPTIONS = (
      "on, before and after adaptation from exploration episodes, as far as there are any."),
     ("value_maps", "What each policy takes a state to be worth (colour), and greedy episodes from "
      "three starts at rest (lines; the titles count their steps). Optimal: value iteration."),
+    ("action_values", "What each policy takes its first action to be worth (colour, from each "
+     "map's lowest to its highest value), and the action it takes."),
     ("convergence_", "Measured beside the theory: %s."),
 )
 

@@ -1,5 +1,6 @@
 """The kinds of figures that run folders give, and the one call that draws them."""
 
+import pmeta_action_values as pa
 import pmeta_convergence as pc
 import pmeta_drawing as pd
 import pmeta_figures as pf
@@ -17,5 +18,6 @@ def draw(experiments, convergence, kinds, figures):
             pu.draw_unseen(experiments, figures["unseen"])
         if "values" in kinds:
             pv.draw_value_maps(experiments, figures["values"])
+            pa.draw_action_values(experiments, figures["values"])
         if "convergence" in kinds:
             pc.draw_convergence(convergence, figures["convergence"])

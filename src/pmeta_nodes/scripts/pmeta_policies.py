@@ -36,12 +36,34 @@ class Policy:
             x = self._linear(x, "q.value") + advantage - advantage.mean(axis=1, keepdims=True)
         return x
 
-    def _linear(self, x, name):
+    def network(self, prefix, inputs):
+        """Batch x outputs of a plain network, "actor" or its like, for batch x its inputs."""
+        x = np.asarray(inputs, dtype=np.float32)
+        layers = sum(name.startswith(prefix + ".layer") and name.endswith(".weight")
+                     for name in self.tensors)
+        if not layers:
+            raise PlotError("%s holds no network '%s': its tensors are %s."
+                            % (self.path, prefix, ", ".join(sorted(self.tensors)) or "none"))
+        for i in range(layers):
+            x = self._linear(x, "%s.layer%d" % (prefix, i), "network '%s'" % prefix)
+            if i < layers - 1:
+                x = np.maximum(x, 0)
+        return x
+
+    def inputs(self, prefix):
+        """How many inputs that network has."""
+        weight = self.tensors.get(prefix + ".layer0.weight")
+        if weight is None or weight.ndim != 2:
+            raise PlotError("%s holds no network '%s': %s.layer0.weight is missing or does not fit."
+                            % (self.path, prefix, prefix))
+        return weight.shape[1]
+
+    def _linear(self, x, name, what="Q-network"):
         try:
             return x @ self.tensors[name + ".weight"].T + self.tensors[name + ".bias"]
         except (KeyError, ValueError):
-            raise PlotError("%s holds no Q-network: %s is missing or does not fit." % (self.path,
-                                                                                     name))
+            raise PlotError("%s holds no %s: %s is missing or does not fit." % (self.path, what,
+                                                                              name))
 
 
 def read_policy(path):

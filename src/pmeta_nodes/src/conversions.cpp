@@ -49,6 +49,7 @@ pmeta::MetaPolicy headerOf(const pmeta_msgs::MetaPolicy& msg) {
   meta.run_id = msg.run_id;
   meta.round = toInt(msg.round, "round");
   meta.participants = toTasks(msg.participants);
+  meta.evaluate = msg.evaluate != 0;
   return meta;
 }
 
@@ -116,6 +117,7 @@ pmeta_msgs::MetaPolicy toMsg(const pmeta::MetaPolicy& meta, int rounds) {
   msg.rounds = static_cast<std::uint32_t>(rounds);
   msg.model = toMsg(meta.model);
   msg.participants = toUnsigned(meta.participants);
+  msg.evaluate = static_cast<std::uint8_t>(meta.evaluate);
   return msg;
 }
 
@@ -151,6 +153,7 @@ pmeta_msgs::TaskReturn toMsg(const pmeta::TaskReturn& result, const std::string&
                                                          : pmeta_msgs::TaskReturn::META;
   msg.split = result.split == pmeta::Split::kTrain ? pmeta_msgs::TaskReturn::TRAIN
                                                    : pmeta_msgs::TaskReturn::TEST;
+  msg.scheduled = static_cast<std::uint8_t>(result.scheduled);
   msg.policy_name = pmeta::name(result.policy);
   msg.split_name = pmeta::name(result.split);
   msg.context_episodes = static_cast<std::uint32_t>(result.context_episodes);
@@ -179,6 +182,7 @@ pmeta::TaskReturn fromMsg(const pmeta_msgs::TaskReturn& msg) {
                                                                  : pmeta::Policy::kMeta;
   result.split =
       msg.split == pmeta_msgs::TaskReturn::TRAIN ? pmeta::Split::kTrain : pmeta::Split::kTest;
+  result.scheduled = msg.scheduled != 0;
   result.context_episodes = toInt(msg.context_episodes, "number of context episodes");
   result.mean = msg.return_mean;
   result.std = msg.return_std;
@@ -213,6 +217,8 @@ pmeta_msgs::Trajectory toMsg(const pmeta::Episode& episode, const pmeta::Experim
   msg.episode_return = std::accumulate(episode.rewards.begin(), episode.rewards.end(), 0.0);
   msg.state_values = episode.state_values;
   msg.greedy_actions = episode.greedy_actions;
+  msg.action_grid = static_cast<std::uint32_t>(episode.action_grid);
+  msg.action_values = episode.action_values;
   return msg;
 }
 

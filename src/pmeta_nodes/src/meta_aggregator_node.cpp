@@ -90,6 +90,7 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
           }),
       ros::VoidConstPtr(), hints);
   pause_service_ = nh_.advertiseService("pause", &MetaAggregatorNode::onPause, this);
+  evaluate_service_ = nh_.advertiseService("evaluate", &MetaAggregatorNode::onEvaluate, this);
   health_ = std::make_unique<Health>(experiment.settings().experiment, "meta aggregator",
                                      [this] { return health(); });
   worker_ = std::thread([this] { work(); });
@@ -120,6 +121,16 @@ bool MetaAggregatorNode::onPause(std_srvs::SetBool::Request& request,
   }
   paused_ = request.data != 0;
   response.message = paused_ ? kPaused : "running";
+  return true;
+}
+
+bool MetaAggregatorNode::onEvaluate(std_srvs::Trigger::Request&,
+                                    std_srvs::Trigger::Response& response) {
+  response.success = !last_is_out_;
+  evaluate_ = !last_is_out_;
+  response.message = last_is_out_
+                         ? "the last meta-policy is out, and is evaluated in any case"
+                         : "the next meta-policy is evaluated, and so are the personal policies";
   return true;
 }
 
@@ -287,8 +298,12 @@ void MetaAggregatorNode::writeCompleteRounds(bool force) {
 }
 
 void MetaAggregatorNode::publishMetaPolicy() {
-  auto msg = boost::make_shared<pmeta_msgs::MetaPolicy>(
-      toMsg(aggregator_.metaPolicy(), experiment_.settings().rounds));
+  const int rounds = experiment_.settings().rounds;
+  pmeta::MetaPolicy meta = aggregator_.metaPolicy();
+  // the initial one is never evaluated
+  meta.evaluate = meta.round > 0 && evaluate_.exchange(false);
+  last_is_out_ = meta.round == rounds;
+  auto msg = boost::make_shared<pmeta_msgs::MetaPolicy>(toMsg(meta, rounds));
   msg->header.stamp = ros::Time::now();
   sign(authenticator_, *msg);
   meta_msg_ = msg;

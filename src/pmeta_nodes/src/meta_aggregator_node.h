@@ -7,6 +7,7 @@
 #include <pmeta_msgs/TaskReturn.h>
 #include <ros/ros.h>
 #include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
 
 #include <atomic>
 #include <chrono>
@@ -38,6 +39,8 @@ namespace pmeta_nodes {
 ///
 /// The service `pause` (true) holds the next meta-policy back, so that agents wait once the round
 /// in hand is done; `pause` (false) lets the run go on. Only time passes: the result is the same.
+/// The service `evaluate` has agents evaluate the next meta-policy, and the personal policies that
+/// they train from it, also outside the schedule; those returns are not written.
 class MetaAggregatorNode {
  public:
   /// Creates the run folder; throws pmeta::Error if that cannot be.
@@ -54,6 +57,7 @@ class MetaAggregatorNode {
       std::variant<pmeta_msgs::AuxiliaryUpdate::ConstPtr, pmeta_msgs::TaskReturn::ConstPtr>;
 
   bool onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
+  bool onEvaluate(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   void work();
   void runRounds();
   void take(const Message& message);
@@ -99,10 +103,13 @@ class MetaAggregatorNode {
   ros::Subscriber returns_sub_;
   ros::Subscriber status_sub_;
   ros::ServiceServer pause_service_;
+  ros::ServiceServer evaluate_service_;
   Mailbox<Message> mailbox_;
 
   std::atomic<bool> stop_{false};
   std::atomic<bool> paused_{false};
+  std::atomic<bool> evaluate_{false};     ///< the next meta-policy
+  std::atomic<bool> last_is_out_{false};  ///< of the meta-policies
   std::atomic<bool> rounds_over_{false};  ///< nothing is left to pause
   std::atomic<bool> done_{false};
   std::atomic<bool> failed_{false};

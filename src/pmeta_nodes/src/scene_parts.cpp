@@ -1,5 +1,7 @@
 #include "scene_parts.h"
 
+#include <algorithm>
+
 #include "pmeta_core/base/format.h"
 
 namespace pmeta_nodes {
@@ -87,9 +89,10 @@ void drawTitle(const SceneContent& content, MarkerArray& scene) {
 }
 
 void drawLegend(const std::vector<LegendEntry>& entries, MarkerArray& scene) {
-  constexpr double kLetter = 0.17;
-  constexpr double kSymbol = 0.25;
-  constexpr double kGap = 0.3;
+  constexpr double kMargin = 0.1;
+  double letter = 0.17;
+  double symbol = 0.25;
+  double gap = 0.3;
   const auto swatch = [](const Color& color) {
     return [color](Figure& figure, const Point& at) { figure.disc(at, 0.1, color); };
   };
@@ -98,21 +101,23 @@ void drawLegend(const std::vector<LegendEntry>& entries, MarkerArray& scene) {
   all.insert(all.end(), entries.begin(), entries.end());
 
   const auto textWidth = [&](const LegendEntry& e) {
-    return kLetterWidth * kLetter * e.text.size();
+    return kLetterWidth * letter * e.text.size();
   };
-  double width = -kGap;
-  for (const LegendEntry& entry : all) width += kSymbol + textWidth(entry) + kGap;
+  double width = -gap;
+  for (const LegendEntry& entry : all) width += symbol + textWidth(entry) + gap;
+  const double shrink = std::min(1.0, (kSceneWidth - 2 * kMargin) / width);
+  for (double* size : {&width, &letter, &symbol, &gap}) *size *= shrink;
 
   const double y = -kSceneHeight / 2 + kLegendHeight / 2;
   Figure figure(kWorldFrame, "legend", 0, kSymbolLayer);
   double x = -width / 2;
   int id = 1;
   for (const LegendEntry& entry : all) {
-    entry.draw(figure, {x + kSymbol / 2 - 0.05, y});
-    const Point at{x + kSymbol + textWidth(entry) / 2, y};
+    entry.draw(figure, {x + symbol / 2 - 0.05, y});
+    const Point at{x + symbol + textWidth(entry) / 2, y};
     scene.markers.push_back(
-        textMarker(kWorldFrame, "legend", id++, at, kTextLayer, entry.text, kLetter, 4, kInk));
-    x += kSymbol + textWidth(entry) + kGap;
+        textMarker(kWorldFrame, "legend", id++, at, kTextLayer, entry.text, letter, 4, kInk));
+    x += symbol + textWidth(entry) + gap;
   }
   scene.markers.push_back(figure.take());
 }

@@ -1,6 +1,9 @@
 #include "sparse_point_scene.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "action_value_map.h"
 
 namespace pmeta_nodes {
 
@@ -14,10 +17,16 @@ constexpr std::size_t kMostPathPoints = 200;
 constexpr int kMostGoals = 24;  // faint ones on a card
 
 // what is seen of the plane; points beyond are drawn on its edge
-constexpr double kLeft = -1.4;
-constexpr double kRight = 1.4;
+constexpr double kLeft = -1.25;
+constexpr double kRight = 1.25;
 constexpr double kBottom = -0.42;
 constexpr double kTop = 1.3;
+
+// the maps of action values, beside it: personal above meta
+constexpr double kMapGap = 0.14;
+constexpr double kLargestMap = 0.68;
+constexpr double kMaps = kMapGap + (1 + kActionValueKey) * kLargestMap;
+constexpr double kMostCells = 30000;  // of all maps
 
 constexpr double kGoalLayer = 0.05;
 constexpr double kFillLayer = 0.1;
@@ -39,13 +48,14 @@ bool hasGoalBelow(const pmeta::SparsePointFamily& family, int num_tasks) {
 SparsePointScene::SparsePointScene(const pmeta::SparsePointFamily& family, int num_tasks)
     : family_(family) {
   bottom_ = hasGoalBelow(family, num_tasks) ? -kTop : kBottom;
-  cards_ = layoutCards(num_tasks, family.numTasks(), 1, kRight - kLeft, kTop - bottom_);
+  cards_ = layoutCards(num_tasks, family.numTasks(), 1, kRight - kLeft + kMaps, kTop - bottom_);
 }
 
 std::vector<geometry_msgs::TransformStamped> SparsePointScene::frames() const {
   std::vector<geometry_msgs::TransformStamped> frames = cardFrames(cards_);
   for (int task = 0; task < cards_.num_tasks; ++task) {
     Point origin = cards_.laneBottom(task, Trajectory::META);
+    origin.x -= kMaps / 2 * scale();
     origin.y -= bottom_ * scale();
     frames.push_back(shiftedFrame(taskFrame(task), planeFrame(task), origin));
   }
@@ -55,7 +65,8 @@ std::vector<geometry_msgs::TransformStamped> SparsePointScene::frames() const {
 std::string SparsePointScene::planeFrame(int task) { return taskFrame(task) + "/plane"; }
 
 std::string SparsePointScene::problem(const Trajectory& trajectory) const {
-  return formProblem(trajectory, kObservation);
+  const std::string problem = formProblem(trajectory, kObservation);
+  return problem.empty() ? actionValueProblem(trajectory) : problem;
 }
 
 int SparsePointScene::reachedAt(const Trajectory& episode, int task, std::size_t last) const {
@@ -98,6 +109,25 @@ void SparsePointScene::drawGoals(Figure& figure, int task) const {
   figure.cross({0, 0}, 0.05 * s, 0.02 * s, kInk);
 }
 
+void SparsePointScene::drawMaps(const SceneContent& content, int task, MarkerArray& scene) const {
+  const double s = scale();
+  const double height = kTop - bottom_;
+  const double side = std::min(kLargestMap, (height - 3 * kMapGap) / 2);
+  const int maps = cards_.num_tasks + cards_.num_train;
+  ActionValuePlace place;
+  place.frame = planeFrame(task);
+  place.side = side * s;
+  place.letter = 0.8 * cards_.letter;
+  place.cells = static_cast<int>(std::sqrt(kMostCells / maps));
+  for (const int policy : policiesOf(cards_, task)) {
+    // a test task's only map stands in the middle
+    const double lower = cards_.isTest(task) ? (height - side) / 2 : kMapGap;
+    const double above = policy == Trajectory::META ? 0 : side + kMapGap;
+    place.corner = {(kRight + kMapGap) * s, (bottom_ + lower + above) * s};
+    drawActionValues(place, task, policy, viewOf(content, task, policy), scene);
+  }
+}
+
 MarkerArray SparsePointScene::still(const SceneContent& content) const {
   MarkerArray scene;
   drawTitle(content, scene);
@@ -109,6 +139,7 @@ MarkerArray SparsePointScene::still(const SceneContent& content) const {
     for (const int policy : policiesOf(cards_, task)) {
       scene.markers.push_back(drawPath(viewOf(content, task, policy), task, policy));
     }
+    drawMaps(content, task, scene);
   }
   drawLegend(
       {{[](Figure& figure, const Point& at) { figure.cross(at, 0.09, 0.035, kInk); }, "start"},
@@ -119,6 +150,21 @@ MarkerArray SparsePointScene::still(const SceneContent& content) const {
           figure.sector(at, 0.11, -kPi / 2, kPi / 2, mix(kMeta, kWhite, 0.45));
         },
         "reached"},
+       {[](Figure& figure, const Point& at) {
+          for (int part = 0; part < 10; ++part) {
+            const double left = at.x - 0.1 + 0.02 * part;
+            figure.rectangle(left, at.y - 0.1, left + 0.02, at.y + 0.1, viridis(part / 9.0));
+          }
+        },
+        "Q at the start by action, -1 to 1"},
+       {[](Figure& figure, const Point& at) {
+          figure.disc(at, 0.11, viridis(0.75));
+          figure.raise();
+          figure.disc(at, 0.07, kWhite);
+          figure.raise();
+          figure.disc(at, 0.05, kInk);
+        },
+        "the action taken"},
        {[](Figure& figure, const Point& at) { figure.ring(at, 0.11, 0.015, kFaint); },
         "other tasks' goals"}},
       scene);

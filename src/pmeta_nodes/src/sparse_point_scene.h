@@ -7,7 +7,8 @@ namespace pmeta_nodes {
 
 /// The point robots: the half circle with all tasks' goals, the task's own bright and filled once a
 /// policy has reached it (left half personal, right half meta), and both policies' paths, on which
-/// the points play the episode.
+/// the points play the episode. Beside them, maps of what both policies take the first action to be
+/// worth.
 ///
 /// Frames "task_<i>/plane" have their origins where episodes start.
 class SparsePointScene : public Scene {
@@ -32,6 +33,8 @@ class SparsePointScene : public Scene {
   Point pointAt(const pmeta_msgs::Trajectory& episode, std::size_t step) const;
   static std::string planeFrame(int task);
   void drawGoals(Figure& figure, int task) const;
+  void drawMaps(const SceneContent& content, int task,
+                visualization_msgs::MarkerArray& scene) const;
   visualization_msgs::Marker drawPath(const PolicyView& view, int task, int policy) const;
   void drawMoving(const PolicyView& view, int task, int policy, double seconds,
                   visualization_msgs::MarkerArray& scene) const;

@@ -176,7 +176,7 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
   const int rounds = experiment_.settings().rounds;
   waitForAggregator();
   if (meta.round > 0 && experiment_.evaluatesMeta() &&
-      experiment_.evaluationSchedule().includes(meta.round)) {
+      (meta.evaluate || experiment_.evaluationSchedule().includes(meta.round))) {
     setState(AgentStatus::EVALUATING,
              "evaluating the meta-policy of round " + std::to_string(meta.round));
     for (const pmeta::TaskReturn& result : agent_.evaluateMeta(meta)) deliver(result);

@@ -141,6 +141,15 @@ TEST(RoundBook, RecordDoesNotDependOnArrivalOrder) {
   }
 }
 
+TEST(RoundBook, TakesNoReturnOutsideTheSchedule) {
+  RoundBook book(threeTasks());
+  TaskReturn asked = makeReturn(1, 0, Policy::kMeta);
+  asked.scheduled = false;
+  EXPECT_FALSE(book.add(asked));
+  asked.scheduled = true;
+  EXPECT_TRUE(book.add(asked)) << "nothing stood in its place";
+}
+
 TEST(RoundBook, WaitsForTheClosingAndForEveryReturn) {
   RoundBook book(threeTasks());
   addAll(book, 1);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "../support.h"
 #include "pmeta_core/run/meta_aggregator.h"
@@ -167,6 +168,10 @@ TEST(TaskAgent, RecordsFromTheSameStartWhateverThePolicyAndRound) {
   TaskAgent agent(experiment, 4);
   agent.trainRound(firstMeta(experiment));
   const Episode personal = agent.recordPersonal();
+  EXPECT_EQ(errorOf([&] { agent.recordMeta(laterMeta(experiment, 6)); }),
+            "the meta-policy of round 6 has not been evaluated: do that before recording an "
+            "episode of it.");
+  agent.evaluateMeta(laterMeta(experiment, 6));
   const Episode meta = agent.recordMeta(laterMeta(experiment, 6));
   const std::vector<double> start(personal.observations.begin(), personal.observations.begin() + 2);
   EXPECT_EQ(std::vector<double>(meta.observations.begin(), meta.observations.begin() + 2), start);
@@ -184,11 +189,67 @@ TEST(TaskAgent, WatchingDoesNotChangeTraining) {
   TaskAgent watched(experiment, 1), alone(experiment, 1);
   for (int round = 0; round < 3; ++round) {
     const MetaPolicy meta = laterMeta(experiment, round);
-    watched.recordMeta(meta);
     watched.evaluateMeta(meta);
+    watched.recordMeta(meta);
     const auto a = watched.trainRound(meta), b = alone.trainRound(meta);
     watched.recordPersonal();
     EXPECT_TRUE(a->update.model == b->update.model);
+  }
+}
+
+TEST(TaskAgent, WhatIsEvaluatedOutsideTheScheduleChangesNothing) {
+  const Experiment experiment =
+      gridExperiment({"evaluation_interval:=3", "catch_up:=0.5", "rounds:=7"});
+  TaskAgent asked(experiment, 1), alone(experiment, 1);
+  for (int round = 0; round < 7; ++round) {
+    MetaPolicy meta = laterMeta(experiment, round);
+    const auto expected = alone.evaluateMeta(meta);
+    meta.evaluate = true;
+    const auto results = asked.evaluateMeta(meta);
+    ASSERT_EQ(results.size(), 1u);
+    EXPECT_EQ(results[0].round, round);
+    EXPECT_EQ(results[0].scheduled, round % 3 == 0);
+    EXPECT_EQ(expected.size(), round % 3 == 0 ? 1u : 0u);
+
+    const auto a = asked.trainRound(meta);
+    meta.evaluate = false;
+    const auto b = alone.trainRound(meta);
+    EXPECT_TRUE(a->update.model == b->update.model);
+    EXPECT_EQ(a->update.weight, b->update.weight);
+    ASSERT_TRUE(a->personal);
+    EXPECT_EQ(a->personal->scheduled, b->personal.has_value());
+    EXPECT_EQ(a->personal->updates, 3 * (round % 3 + 1)) << "since the last scheduled one";
+    if (!b->personal) continue;
+    EXPECT_EQ(a->personal->mean, b->personal->mean);
+    EXPECT_EQ(a->personal->updates, b->personal->updates);
+    EXPECT_EQ(a->personal->env_steps, b->personal->env_steps);
+  }
+}
+
+TEST(TaskAgent, TheRecordedEpisodeIsOfThePolicyWhoseReturnIsShown) {
+  const Experiment experiment = Experiment::parse(
+      "learner: sac\nrounds: 2\nupdates_per_round: 3\n"
+      "environment: {name: half_cheetah_vel, horizon: 10, velocities: [1, 2],"
+      " test_velocities: [3]}\n"
+      "sac: {hidden: [16, 16], batch_size: 16, warm_up_steps: 50, evaluation_episodes: 1,"
+      " task_encoding: inference, exploration_episodes: [1, 2], context_hidden: [8, 8],"
+      " context_batch: 16}",
+      "test");
+  for (const int task : {0, 2}) {
+    TaskAgent agent(experiment, task);
+    MetaPolicy meta = MetaAggregator(experiment).metaPolicy();
+    meta.round = 1;
+    const std::vector<TaskReturn> returns = agent.evaluateMeta(meta);
+    ASSERT_EQ(returns.size(), 3u);
+    const auto sum = [](const Episode& episode) {
+      return std::accumulate(episode.rewards.begin(), episode.rewards.end(), 0.0);
+    };
+    EXPECT_DOUBLE_EQ(sum(agent.recordMeta(meta)), returns[2].mean);
+    EXPECT_NE(returns[0].mean, returns[2].mean) << "before exploration it acts in another way";
+    EXPECT_NE(returns[1].mean, returns[2].mean);
+    if (!agent.trains()) continue;
+    const auto result = agent.trainRound(meta);
+    EXPECT_DOUBLE_EQ(sum(agent.recordPersonal()), result->personal->mean);
   }
 }
 

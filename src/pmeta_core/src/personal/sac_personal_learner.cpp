@@ -2,10 +2,13 @@
 
 #include <algorithm>
 
+#include "pmeta_core/learn/action_values.h"
 #include "pmeta_core/learn/context_adaptation.h"
 
 namespace pmeta {
 namespace {
+
+constexpr int kActionGrid = 21;  // fine enough for the eye, and 2 kB in an episode
 
 std::vector<float> taskInputOf(const SacSettings& settings, int task, int num_tasks) {
   return settings.task_encoding == "one_hot" ? oneHot(task, num_tasks) : std::vector<float>();
@@ -124,8 +127,28 @@ ReturnStats SacPersonalLearner::evaluate(const Model& policy, Rng& rng) const {
 }
 
 Episode SacPersonalLearner::record(const Model& policy, Rng& rng) const {
-  const std::vector<float> task_input = taskInput(policy);
-  return evaluation_->record(greedy(policy, task_input), rng);
+  return recordWith(policy, taskInput(policy), rng);
+}
+
+Episode SacPersonalLearner::recordAdapted(const Model& policy, const AdaptedReturn& adapted,
+                                          Rng& rng) const {
+  if (!learner_.networks().hasEncoder()) return record(policy, rng);
+  return recordWith(policy, adapted.task_input, rng);
+}
+
+Episode SacPersonalLearner::recordWith(const Model& policy, const std::vector<float>& task_input,
+                                       Rng& rng) const {
+  Episode episode = evaluation_->record(greedy(policy, task_input), rng);
+  const SacNetworks& networks = learner_.networks();
+  if (networks.actionSize() == 2) {
+    const std::vector<float> start(
+        episode.observations.begin(),
+        episode.observations.begin() + static_cast<std::ptrdiff_t>(networks.observationSize()));
+    episode.action_grid = kActionGrid;
+    episode.action_values = actionValues(networks, policy.floats().data(), start.data(),
+                                         task_input.data(), kActionGrid);
+  }
+  return episode;
 }
 
 std::vector<AdaptedReturn> SacPersonalLearner::evaluateAdapted(const Model& policy,
@@ -134,12 +157,14 @@ std::vector<AdaptedReturn> SacPersonalLearner::evaluateAdapted(const Model& poli
   const Rng starts = rng;
   // before exploring there is the prior's mean; `rng` moves on, away from the starts
   const std::vector<float> unknown(learner_.networks().encoder().latentSize());
-  std::vector<AdaptedReturn> returns = {{0, evaluation_->run(greedy(policy, unknown), rng)}};
+  std::vector<AdaptedReturn> returns = {
+      {0, evaluation_->run(greedy(policy, unknown), rng), unknown}};
   for (const Adaptation& adaptation : adapt(learner_.networks(), learner_.settings().context,
                                             policy.floats().data(), *exploration_env_, rng)) {
     Rng same_starts = starts;
-    returns.push_back(
-        {adaptation.episodes, evaluation_->run(greedy(policy, adaptation.latent), same_starts)});
+    returns.push_back({adaptation.episodes,
+                       evaluation_->run(greedy(policy, adaptation.latent), same_starts),
+                       adaptation.latent});
   }
   return returns;
 }

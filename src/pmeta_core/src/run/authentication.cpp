@@ -125,6 +125,7 @@ Mac Authenticator::mac(const MetaPolicy& header, const ModelView& model, int rou
   stream.put(header.round);
   stream.put(rounds);
   stream.put(header.participants);
+  stream.put(static_cast<int>(header.evaluate));
   stream.put(model);
   return stream.finish();
 }
@@ -137,6 +138,7 @@ Mac Authenticator::mac(const TaskReturn& result, const std::string& task_name) c
   stream.put(result.round);
   stream.put(static_cast<int>(result.split));
   stream.put(static_cast<int>(result.policy));
+  stream.put(static_cast<int>(result.scheduled));
   stream.put(result.context_episodes);
   stream.put(result.mean);
   stream.put(result.std);

@@ -33,16 +33,22 @@ const char* name(Policy policy) { return policy == Policy::kPersonal ? "personal
 const char* name(Split split) { return split == Split::kTrain ? "train" : "test"; }
 
 void TaskReturn::saveState(StateWriter& writer) const {
-  const std::vector<std::int64_t> counts = {
-      task,      round,  split == Split::kTest, policy == Policy::kMeta, context_episodes, episodes,
-      env_steps, updates};
+  const std::vector<std::int64_t> counts = {task,
+                                            round,
+                                            split == Split::kTest,
+                                            policy == Policy::kMeta,
+                                            context_episodes,
+                                            episodes,
+                                            env_steps,
+                                            updates,
+                                            scheduled};
   const std::vector<double> numbers = {mean, std, seconds};
   writer.array("counts", counts);
   writer.array("numbers", numbers);
 }
 
 void TaskReturn::loadState(StateReader& reader) {
-  std::vector<std::int64_t> counts(8);
+  std::vector<std::int64_t> counts(9);
   std::vector<double> numbers(3);
   reader.counts("counts", counts);
   reader.array("numbers", numbers);
@@ -58,6 +64,7 @@ void TaskReturn::loadState(StateReader& reader) {
   episodes = static_cast<int>(counts[5]);
   env_steps = counts[6];
   updates = counts[7];
+  scheduled = counts[8] != 0;
   mean = numbers[0];
   std = numbers[1];
   seconds = numbers[2];

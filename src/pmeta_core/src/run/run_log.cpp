@@ -69,7 +69,8 @@ RoundBook::RoundBook(const Experiment& experiment)
 
 bool RoundBook::add(const TaskReturn& result) {
   if (result.run_id != run_id_ || result.task < 0 || result.task >= total_tasks_ ||
-      result.round < next_ || result.round > rounds_ || !evaluations_.includes(result.round)) {
+      result.round < next_ || result.round > rounds_ || !evaluations_.includes(result.round) ||
+      !result.scheduled) {
     return false;
   }
   // what no agent of this run evaluates

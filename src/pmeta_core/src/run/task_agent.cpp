@@ -61,14 +61,19 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   result.distance = distance(learner_->personal(), meta.model);
   env_steps_ += result.env_steps;
   updates_ += result.updates;
-  if (evaluations_.includes(round)) {
+  const bool scheduled = evaluations_.includes(round);
+  if (scheduled || meta.evaluate) {
     Rng evaluation = evaluationRng();
     TaskReturn personal =
         makeReturn(round, Policy::kPersonal, learner_->evaluate(learner_->personal(), evaluation));
-    personal.env_steps = std::exchange(env_steps_, 0);
-    personal.updates = std::exchange(updates_, 0);
+    personal.scheduled = scheduled;
+    personal.env_steps = env_steps_;
+    personal.updates = updates_;
     personal.seconds = watch.seconds();
-    adjustWeight(personal.mean);
+    if (scheduled) {
+      env_steps_ = updates_ = 0;
+      adjustWeight(personal.mean);
+    }
     result.personal = std::move(personal);
   }
   last_ = std::move(result);
@@ -88,15 +93,20 @@ TaskAgent::RoundResult TaskAgent::lastResult() const {
 std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) {
   checkModel(meta.model, learner_->layout(), "the aggregator");
   std::vector<TaskReturn> results;
-  if (!evaluations_.includes(meta.round)) return results;
+  const bool scheduled = evaluations_.includes(meta.round);
+  if (!scheduled && !meta.evaluate) return results;
   const Stopwatch watch;
   Rng rng = evaluationRng();
-  for (const AdaptedReturn& adapted : learner_->evaluateAdapted(meta.model, rng)) {
+  const std::vector<AdaptedReturn> all = learner_->evaluateAdapted(meta.model, rng);
+  for (const AdaptedReturn& adapted : all) {
     results.push_back(makeReturn(meta.round, Policy::kMeta, adapted.stats));
+    results.back().scheduled = scheduled;
     results.back().context_episodes = adapted.context_episodes;
     results.back().seconds = watch.seconds();
   }
-  meta_return_ = results.back().mean;
+  if (scheduled) meta_return_ = results.back().mean;
+  adapted_ = all.back();
+  adapted_round_ = meta.round;
   return results;
 }
 
@@ -180,8 +190,12 @@ Episode TaskAgent::recordPersonal() const {
 
 Episode TaskAgent::recordMeta(const MetaPolicy& meta) const {
   checkModel(meta.model, learner_->layout(), "the aggregator");
+  if (meta.round != adapted_round_) {
+    throw Error("the meta-policy of round " + std::to_string(meta.round) +
+                " has not been evaluated: do that before recording an episode of it.");
+  }
   Rng rng = evaluationRng();
-  return learner_->record(meta.model, rng);
+  return learner_->recordAdapted(meta.model, adapted_, rng);
 }
 
 // log w <- 0.8 log w + catch_up * gap, where gap in [0, 1] is how far the meta-policy that this

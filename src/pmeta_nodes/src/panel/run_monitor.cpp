@@ -20,7 +20,7 @@ constexpr std::uint32_t kManyAgents = 256;
 std::string serviceOf(Request request) {
   switch (request) {
     case Request::kEvaluate:
-      return "/pmeta/evaluate_now";
+      return "/pmeta/evaluate";
     case Request::kCheckpoint:
       return "/pmeta/save_checkpoint";
     default:

@@ -23,7 +23,7 @@ namespace pmeta_nodes {
 enum class Request {
   kPause,       ///< pause (std_srvs/SetBool) with true
   kResume,      ///< pause with false
-  kEvaluate,    ///< evaluate_now (std_srvs/Trigger)
+  kEvaluate,    ///< evaluate (std_srvs/Trigger)
   kCheckpoint,  ///< save_checkpoint (std_srvs/Trigger)
 };
 

@@ -128,6 +128,9 @@ void RunPanel::build() {
   auto* buttons = new QHBoxLayout;
   for (QPushButton* button : {pause_, evaluate_, checkpoint_}) buttons->addWidget(button);
   answer_ = addLabel("answer", kFaintStyle);
+  // an answer must not push the buttons away from under the mouse
+  answer_->setMinimumHeight(2 * answer_->fontMetrics().lineSpacing());
+  answer_->setAlignment(Qt::AlignTop);
 
   auto* all = new QVBoxLayout(this);
   all->addLayout(head);
@@ -226,7 +229,8 @@ void RunPanel::showButtons(const RunState& state) {
   showButton(pause_, Request::kPause, state.active(),
              paused ? "let the next meta-policy go out"
                     : "hold the next meta-policy back; the result stays the same");
-  showButton(evaluate_, Request::kEvaluate, state.active(), "evaluate the policies as they are");
+  showButton(evaluate_, Request::kEvaluate, state.active(),
+             "evaluate the next meta-policy, whatever the schedule; the result stays the same");
   showButton(checkpoint_, Request::kCheckpoint, state.active(), "save the run as it is");
 }
 

@@ -23,6 +23,9 @@ struct Episode {
   bool truncated = false;
   std::vector<double> state_values;  ///< tabular tasks: max_a Q(s,a) by state, NaN where not owned
   std::vector<std::int32_t> greedy_actions;  ///< tabular tasks: argmax_a Q(s,a), -1 where not owned
+  int action_grid = 0;  ///< actions along each axis of `action_values`; 0: there are none
+  std::vector<float>
+      action_values;  ///< two-dimensional actions: Q at the start, see actionValues()
 };
 
 /// What one personalised update cost and gave.
@@ -36,6 +39,7 @@ struct UpdateStats {
 struct AdaptedReturn {
   int context_episodes = 0;  ///< how many; 0: before any
   ReturnStats stats;
+  std::vector<float> task_input = {};  ///< what it knew then; empty without an inference network
 };
 
 /// A learner bound to one task with its personal parameters phi and auxiliary parameters omega.
@@ -77,6 +81,13 @@ class PersonalLearner {
 
   /// One greedy episode of `policy` from a start drawn by `rng`.
   virtual Episode record(const Model& policy, Rng& rng) const = 0;
+
+  /// The same of a policy that knows what it knew in `adapted`, which evaluateAdapted() gave: with
+  /// its `rng`, the first of the episodes behind that return.
+  virtual Episode recordAdapted(const Model& policy, const AdaptedReturn& adapted, Rng& rng) const {
+    static_cast<void>(adapted);
+    return record(policy, rng);
+  }
 
   /// All that later rounds depend on, between two updates: parameters, optimiser, replay, target
   /// networks, environments. Loaded by a learner of the same settings and task, it goes on bit for

@@ -48,7 +48,9 @@ class SacPersonalLearner : public PersonalLearner {
   /// encoder infers from the context this learner has collected.
   ReturnStats evaluate(const Model& policy, Rng& rng) const override;
   std::vector<float> taskInput(const Model& policy) const override;
+  /// With the action values at the start, if actions have two dimensions.
   Episode record(const Model& policy, Rng& rng) const override;
+  Episode recordAdapted(const Model& policy, const AdaptedReturn& adapted, Rng& rng) const override;
   void saveState(StateWriter& writer) const override;
   void loadState(StateReader& reader) override;
 
@@ -61,7 +63,7 @@ class SacPersonalLearner : public PersonalLearner {
 
  private:
   BatchPolicy greedy(const Model& policy, const std::vector<float>& task_input) const;
-
+  Episode recordWith(const Model& policy, const std::vector<float>& task_input, Rng& rng) const;
   void setLambda(std::size_t offset, const Mlp& network, double lambda);
 
   SacLearner learner_;

@@ -16,6 +16,7 @@ struct MetaPolicy {
   int round = 0;
   Model model;
   std::vector<int> participants;  ///< tasks in this aggregation, ascending; empty for round 0
+  bool evaluate = false;  ///< somebody wants this one and the personal policies after it evaluated
 };
 
 /// What an agent sends at the end of its round: auxiliary (or, when averaging, personal)
@@ -39,6 +40,7 @@ struct TaskReturn {
   std::string run_id;
   int task = 0;
   int round = 0;
+  bool scheduled = true;  ///< false: somebody asked for it; in no table, only to be looked at
   Split split = Split::kTrain;
   Policy policy = Policy::kPersonal;
   int context_episodes = 0;  ///< meta-policy: exploration episodes that it has adapted from

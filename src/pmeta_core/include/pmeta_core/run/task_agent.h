@@ -18,6 +18,7 @@ class TaskAgent {
   struct RoundResult {
     AuxiliaryUpdate update;
     std::optional<TaskReturn> personal;  ///< in rounds that evaluate; counts all since the last
+                                         ///< scheduled one
     std::int64_t env_steps = 0;          ///< of this round
     std::int64_t updates = 0;            ///< of this round
     double loss = 0;                     ///< of the last update
@@ -38,8 +39,10 @@ class TaskAgent {
   const ModelLayout& layout() const { return learner_->layout(); }
 
   /// One round from `meta`: reset, R updates, and evaluation of the personal policy where
-  /// Experiment::evaluationSchedule() has it. Nothing if stopped. Throws Error if the meta-policy
-  /// does not fit.
+  /// Experiment::evaluationSchedule() has it, or `meta` asks for it. Nothing if stopped. Throws
+  /// Error if the meta-policy does not fit.
+  ///
+  /// An evaluation outside the schedule changes nothing that training or scheduled ones see.
   ///
   /// The round trained last is not trained again: asked for it once more, also after loadState(),
   /// it gives the same result. So an agent that ended between saving and sending sends what it
@@ -47,7 +50,7 @@ class TaskAgent {
   std::optional<RoundResult> trainRound(const MetaPolicy& meta, const KeepGoing& keep_going = {});
 
   /// The meta-policy on this task: one return for each of Experiment::contextEpisodes(), or none
-  /// in a round that does not evaluate.
+  /// in a round that does not evaluate and where `meta` does not ask for it.
   std::vector<TaskReturn> evaluateMeta(const MetaPolicy& meta);
 
   /// A policy on this task, on at least `episodes` episodes that no round evaluates; a meta-policy
@@ -69,6 +72,8 @@ class TaskAgent {
 
   /// One greedy episode, from the same start whatever the policy and round.
   Episode recordPersonal() const;
+  /// The first episode behind the last return that evaluateMeta() gave of this meta-policy: after
+  /// the most exploration. Throws Error if the last call was of another round's, or none.
   Episode recordMeta(const MetaPolicy& meta) const;
 
  private:
@@ -92,7 +97,9 @@ class TaskAgent {
   std::int64_t updates_ = 0;
   double catch_up_;
   double log_weight_ = 0;              // of this task's updates in the mean
-  std::optional<double> meta_return_;  // the newest on this task
+  std::optional<double> meta_return_;  // the newest scheduled one on this task
+  AdaptedReturn adapted_;              // of the newest evaluation of a meta-policy,
+  int adapted_round_ = -1;             // which was this round's
   std::unique_ptr<PersonalLearner> learner_;
 };
 
