@@ -59,6 +59,23 @@ def test_a_misspelt_key_in_a_file_is_named_with_its_line(tmp_path):
                              "'personal.lambda'?\n" % config)
 
 
+BAD_WORDS = [
+    (["fuzz", "yaml"],
+     "unknown target 'yaml'; known are: csv layout message policy replay settings."),
+    (["fuzz", "csv", "--seconds"], "--seconds needs a whole number, at least 1."),
+    (["fuzz", "csv", "--seconds", "1m"], "--seconds needs a whole number, at least 1."),
+    (["test", "--msan"], "unknown option '--msan' of test: see ./pmeta --help."),
+]
+
+
+@pytest.mark.parametrize("words,sentence", BAD_WORDS)
+def test_bad_words_are_told_before_anything_is_built(words, sentence):
+    result = run([TOP / "pmeta"] + words)
+    assert result.returncode == 1
+    assert result.stderr == "pmeta: %s\n" % sentence
+    assert result.stdout == ""
+
+
 def test_an_unwritable_results_folder_is_told_before_anything_starts(tmp_path):
     (tmp_path / "file").write_text("")
     result = run([LOCAL, "run", CONFIG, "results_dir:=%s/file/results" % tmp_path])

@@ -1,10 +1,17 @@
 #include "pmeta_core/run/meta_aggregator.h"
 
+#include <cmath>
+
 #include "pmeta_core/aggregate/mix.h"
 #include "pmeta_core/aggregate/trimmed_mix.h"
 #include "pmeta_core/base/error.h"
 
 namespace pmeta {
+namespace {
+
+constexpr double kLargest = 1e150;  ///< sums of larger values, with their weights, could overflow
+
+}  // namespace
 
 MetaAggregator::MetaAggregator(const Experiment& experiment)
     : rounds_(experiment.settings().rounds),
@@ -73,6 +80,14 @@ std::string MetaAggregator::refusal(const AuxiliaryUpdate& update) const {
     checkModel(update.model, meta_.model.layout, who);
   } catch (const Error& error) {
     return error.what();
+  }
+  if (const auto* values = std::get_if<std::vector<double>>(&update.model.values)) {
+    for (std::size_t k = 0; k < values->size(); ++k) {
+      if (!update.model.isPresent(k) || std::abs((*values)[k]) <= kLargest) continue;
+      return who + " sent " + formatNumber((*values)[k]) + " (entry " + std::to_string(k) +
+             "), which is beyond " + formatNumber(kLargest) +
+             ": has its training diverged? Lower alpha or lambda.";
+    }
   }
   return "";
 }
