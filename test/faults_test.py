@@ -1,5 +1,6 @@
 """What happens to a run when things around it die."""
 import contextlib
+import json
 import os
 import signal
 import subprocess
@@ -7,7 +8,7 @@ import time
 
 import pytest
 
-from programs import CONFIG, environment, run
+from programs import CONFIG, LOCAL, environment, run
 
 SETTINGS = ["rounds:=1000", "pace:=0.05", "run_id:=faults"]
 
@@ -92,3 +93,84 @@ def test_nodes_stop_and_say_so_when_the_master_is_gone(tmp_path, restarted):
                         else "has been out of reach for 10 s") in said, name
                 assert "Start the run again with resume:=%s." % folder in said, name
     assert '"status": "stopped"' in (folder / "manifest.json").read_text()
+
+
+SHORT = ["rounds:=20", "pace:=0.1", "seed:=3"]
+
+
+def rows(folder):
+    """The lines of rounds.csv without the wall time."""
+    return [line.rsplit(",", 1)[0] for line in (folder / "rounds.csv").read_text().splitlines()]
+
+
+def undisturbed(tmp_path):
+    """The rows of the same run in one process."""
+    done = run([LOCAL, "run", CONFIG, "run_id:=local", "results_dir:=%s" % (tmp_path / "local")] +
+               [word for word in SHORT if not word.startswith("pace")])
+    assert done.returncode == 0, done.stderr
+    return rows(tmp_path / "local/gridworld/local")
+
+
+def launch(*arguments):
+    return ["roslaunch", "pmeta_nodes", "gridworld.launch"] + list(arguments)
+
+
+def kill_all(env):
+    """SIGKILL to everything that belongs to that master, roslaunch first."""
+    for name in ("roslaunch", "rosmaster", "task_agent", "meta_aggregator", "run_guard", "rosout"):
+        for entry in os.listdir("/proc"):
+            with contextlib.suppress(OSError, ValueError):
+                with open("/proc/%d/environ" % int(entry), "rb") as file:
+                    mine = env["ROS_HOME"].encode() in file.read()
+                with open("/proc/%s/cmdline" % entry, "rb") as file:
+                    named = name.encode() in file.read()
+                if mine and named:
+                    os.kill(int(entry), signal.SIGKILL)
+
+
+def test_a_run_whose_every_process_was_killed_goes_on_with_the_same_result(tmp_path):
+    folder = tmp_path / "results/gridworld/cut"
+    env = environment(tmp_path)
+    with process(launch("run_id:=cut", "results_dir:=%s" % (tmp_path / "results"), *SHORT),
+                 tmp_path / "first.log", env):
+        assert wait_until(lambda: rounds_written(folder) >= 6)
+        kill_all(env)
+    assert json.loads((folder / "manifest.json").read_text())["status"] == "running"
+    # another settings file, or another setting, is refused before anything starts
+    other = run(launch("resume:=%s" % folder, "lambda:=3"), env=environment(tmp_path))
+    assert other.returncode == 1
+    assert "personal.lambda cannot be changed in a run that goes on" in other.stderr
+    other = run(["roslaunch", "pmeta_nodes", "cart_pole.launch", "resume:=%s" % folder],
+                env=environment(tmp_path))
+    assert other.returncode == 1
+    assert "is of experiment 'gridworld'" in other.stderr
+
+    again = run(launch("resume:=%s" % folder, "pace:=0"), env=environment(tmp_path))
+    assert rows(folder) == undisturbed(tmp_path), again.stdout
+    assert json.loads((folder / "manifest.json").read_text())["status"] == "finished"
+    # and a finished one is not begun again
+    over = run(launch("resume:=%s" % folder), env=environment(tmp_path))
+    assert over.returncode == 1
+    assert "finished" in over.stderr
+
+
+def test_while_checkpoints_cannot_be_written_the_run_is_held_and_says_why(tmp_path):
+    folder = tmp_path / "results/gridworld/held"
+    env = environment(tmp_path)
+    log = tmp_path / "launch.log"
+    with process(launch("run_id:=held", "results_dir:=%s" % (tmp_path / "results"), *SHORT),
+                 log, env) as launched:
+        assert wait_until(lambda: rounds_written(folder) >= 4)
+        (folder / "checkpoint").rename(folder / "away")
+        (folder / "checkpoint").write_text("in the way")
+        assert wait_until(lambda: "The run is held until that is mended" in log.read_text())
+        told = run(["rostopic", "echo", "-n", "1", "/pmeta/round"], env=env, timeout=30).stdout
+        assert "state: 6" in told and "checkpoint" in told, told
+        held = rounds_written(folder)
+        time.sleep(3)
+        assert rounds_written(folder) <= held + 1, "it goes on"
+        (folder / "checkpoint").unlink()
+        (folder / "away").rename(folder / "checkpoint")
+        launched.wait(timeout=60)
+    assert "the results can be written again; the run goes on." in log.read_text()
+    assert rows(folder) == undisturbed(tmp_path)

@@ -50,6 +50,8 @@ pmeta::MetaPolicy headerOf(const pmeta_msgs::MetaPolicy& msg) {
   meta.round = toInt(msg.round, "round");
   meta.participants = toTasks(msg.participants);
   meta.evaluate = msg.evaluate != 0;
+  meta.incarnation = msg.incarnation;
+  meta.checkpoint = msg.checkpoint != 0;
   return meta;
 }
 
@@ -118,6 +120,8 @@ pmeta_msgs::MetaPolicy toMsg(const pmeta::MetaPolicy& meta, int rounds) {
   msg.model = toMsg(meta.model);
   msg.participants = toUnsigned(meta.participants);
   msg.evaluate = static_cast<std::uint8_t>(meta.evaluate);
+  msg.incarnation = meta.incarnation;
+  msg.checkpoint = static_cast<std::uint8_t>(meta.checkpoint);
   return msg;
 }
 

@@ -1,5 +1,6 @@
 #include "meta_aggregator_node.h"
 #include "node_main.h"
+#include "pmeta_core/base/error.h"
 
 namespace {
 
@@ -11,16 +12,25 @@ run folder.
 
 private parameters
   ~hold         stay after the last round until stopped (default false)
+  ~resume       go on with the run that the run folder holds, if it holds one (default false)
   ~config_file  settings file; by default the parameter `config` of the namespace is read
 subscribes   auxiliary, returns
 publishes    meta_policy, round (both latched), /diagnostics
 offers       pause (std_srvs/SetBool): true holds the next meta-policy back, false lets the run go on
+             save_checkpoint (std_srvs/Trigger): all save one when the next round is done
 Normally started by roslaunch pmeta_nodes gridworld.launch.
 )";
 
 int runAggregator(const pmeta::Experiment& experiment) {
-  const bool hold = ros::NodeHandle("~").param("hold", false);
-  return pmeta_nodes::MetaAggregatorNode(experiment, hold).spin();
+  const ros::NodeHandle own("~");
+  const bool hold = own.param("hold", false);
+  const bool resume = own.param("resume", false);
+  try {
+    return pmeta_nodes::MetaAggregatorNode(experiment, hold, resume).spin();
+  } catch (const pmeta::Error& error) {
+    pmeta_nodes::announceStop(experiment, error.what());
+    throw;
+  }
 }
 
 }  // namespace

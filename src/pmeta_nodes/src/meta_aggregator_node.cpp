@@ -29,6 +29,9 @@ constexpr std::chrono::duration<double> kStartUp{15};
 // for the last messages to reach everybody before the node, and with it the launch, ends
 constexpr double kFarewell = 0.5;
 
+constexpr std::chrono::seconds kRetryDisk{2};
+constexpr char kHeld[] = " The run is held until that is mended.";
+
 constexpr char kPaused[] =
     "paused: agents finish the round in hand, the next meta-policy waits until the service pause "
     "is "
@@ -52,13 +55,14 @@ void logLines(const std::string& text) {
 
 }  // namespace
 
-MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool hold)
+MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool hold, bool resume)
     : experiment_(experiment),
       hold_(hold),
       authenticator_(experiment.settings().key_file),
       aggregator_(experiment),
       book_(experiment),
-      log_(experiment),
+      checkpoints_(experiment, pmeta::kAggregator, aggregator_.metaPolicy().model.layout),
+      log_(openLog(resume)),
       console_(experiment, isTerminal()),
       roll_call_(experiment.totalTasks(), kSilence, kStartUp),
       mailbox_(8 * static_cast<std::size_t>(experiment.totalTasks()) + 16) {
@@ -91,9 +95,37 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
       ros::VoidConstPtr(), hints);
   pause_service_ = nh_.advertiseService("pause", &MetaAggregatorNode::onPause, this);
   evaluate_service_ = nh_.advertiseService("evaluate", &MetaAggregatorNode::onEvaluate, this);
+  checkpoint_service_ =
+      nh_.advertiseService("save_checkpoint", &MetaAggregatorNode::onSaveCheckpoint, this);
   health_ = std::make_unique<Health>(experiment.settings().experiment, "meta aggregator",
                                      [this] { return health(); });
   worker_ = std::thread([this] { work(); });
+}
+
+void MetaAggregatorNode::State::saveState(pmeta::StateWriter& writer) const {
+  writer.part("aggregator", aggregator);
+  writer.part("book", book);
+}
+
+void MetaAggregatorNode::State::loadState(pmeta::StateReader& reader) {
+  reader.part("aggregator", aggregator);
+  reader.part("book", book);
+}
+
+std::unique_ptr<pmeta::RunLog> MetaAggregatorNode::openLog(bool resume) {
+  const std::string status = pmeta::runStatus(experiment_.runDir());
+  if (!resume || status.empty()) return std::make_unique<pmeta::RunLog>(experiment_);
+  std::vector<std::string> refused;
+  const int rounds = experiment_.settings().rounds;
+  const int round = checkpoints_.newest(rounds, refused);
+  for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
+  if (round > 0) {
+    State state{aggregator_, book_};
+    checkpoints_.load(round, state);
+  }
+  if (status == "finished") return nullptr;
+  ROS_INFO("going on after round %d.", round);
+  return std::make_unique<pmeta::RunLog>(pmeta::RunLog::reopen(experiment_, book_.roundsTaken()));
 }
 
 MetaAggregatorNode::~MetaAggregatorNode() {
@@ -134,6 +166,15 @@ bool MetaAggregatorNode::onEvaluate(std_srvs::Trigger::Request&,
   return true;
 }
 
+bool MetaAggregatorNode::onSaveCheckpoint(std_srvs::Trigger::Request&,
+                                          std_srvs::Trigger::Response& response) {
+  response.success = !rounds_over_;
+  checkpoint_wanted_ = !rounds_over_;
+  response.message = rounds_over_ ? "the rounds are over: there is nothing to save"
+                                  : "all save a checkpoint when the round after this one is done";
+  return true;
+}
+
 void MetaAggregatorNode::work() {
   try {
     runRounds();
@@ -142,7 +183,7 @@ void MetaAggregatorNode::work() {
     failed_ = true;
     try {
       publishRound(RoundSummary::STOPPED, error.what());
-      log_.finish("failed");
+      if (log_) log_->finish("failed");
     } catch (const std::exception& second) {
       ROS_FATAL("%s", second.what());
     }
@@ -154,34 +195,42 @@ void MetaAggregatorNode::work() {
 void MetaAggregatorNode::runRounds() {
   const int rounds = experiment_.settings().rounds;
   const int tests = experiment_.numTestTasks();
+  const std::string dir = experiment_.runDir();
+  if (!log_) {
+    rounds_over_ = true;
+    publishRound(RoundSummary::FINISHED, "all rounds are done; results in " + dir);
+    return;
+  }
   ROS_INFO("run %s: %d tasks%s, %d rounds; results in %s", summary_.run_id.c_str(),
            experiment_.numTasks(),
            tests == 0 ? "" : (" and " + std::to_string(tests) + " test tasks").c_str(), rounds,
-           log_.dir().c_str());
+           dir.c_str());
   publishRound(RoundSummary::RUNNING, "waiting for the agents' first updates");
   publishMetaPolicy();
-  while (!stop_ && book_.roundsTaken() < rounds) {
+  while (!stop_ && (book_.roundsTaken() < rounds || !unwritten_.empty())) {
     if (const auto message = mailbox_.pop(kTick)) take(*message);
-    writeCompleteRounds(false);
+    collectCompleteRounds(false);
+    writeDown();
     announcePause();
     closeRoundIfDue();
     announceMissing();
   }
   rounds_over_ = true;
-  const bool finished = book_.roundsTaken() == rounds;
-  if (!finished) writeCompleteRounds(true);
+  if (book_.roundsTaken() < rounds) collectCompleteRounds(true);
+  writeDown();
+  const bool finished = book_.roundsTaken() == rounds && unwritten_.empty();
   const pmeta::MetaPolicy& meta = aggregator_.metaPolicy();
   if (meta.round > 0) {
     pmeta::saveRunPolicy(experiment_, pmeta::Policy::kMeta, -1, meta.round, meta.model);
   }
   if (finished) {
-    log_.finish("finished");
-    publishRound(RoundSummary::FINISHED, "all rounds are done; results in " + log_.dir());
-    logLines(console_.table() + "finished; " + pmeta::listRunFolder(log_.dir()));
+    log_->finish("finished");
+    publishRound(RoundSummary::FINISHED, "all rounds are done; results in " + dir);
+    logLines(console_.table() + "finished; " + pmeta::listRunFolder(dir));
   } else {
-    log_.finish("stopped");
+    log_->finish("stopped");
     publishRound(RoundSummary::STOPPED, "stopped in round " + std::to_string(meta.round + 1));
-    ROS_WARN("stopped in round %d; what was done is in %s", meta.round + 1, log_.dir().c_str());
+    ROS_WARN("stopped in round %d; what was done is in %s", meta.round + 1, dir.c_str());
   }
 }
 
@@ -247,9 +296,11 @@ void MetaAggregatorNode::closeRoundIfDue() {
                     experiment_.quorum() < experiment_.numTasks();
   if (round > settings.rounds) {
     // only returns of the last meta-policy are still out
-    if (late) writeCompleteRounds(true);
+    if (late) collectCompleteRounds(true);
     return;
   }
+  // what is done comes first to the disk
+  if (unpublished_ || !unwritten_.empty()) return;
   if (roundSeconds() < settings.pace) return;
   // a full round waits for the returns too: whoever is killed and comes back can still send them
   const bool complete =
@@ -261,7 +312,7 @@ void MetaAggregatorNode::closeRoundIfDue() {
   }
   const Clock::time_point due = held_since_.value_or(Clock::now());
   const double seconds = std::chrono::duration<double>(due - round_start_).count();
-  writeCompleteRounds(true);
+  collectCompleteRounds(true);
   const std::vector<int> missing = aggregator_.closeRound();
   if (!missing.empty()) {
     ROS_WARN("round %d was closed by quorum without %s.", round, taskNames(missing).c_str());
@@ -272,12 +323,13 @@ void MetaAggregatorNode::closeRoundIfDue() {
   }
   book_.closeRound(round, aggregator_.metaPolicy().participants, missing, seconds,
                    aggregator_.excluded());
-  publishMetaPolicy();
+  unpublished_ = true;
+  next_attempt_ = Clock::now();
+  writeDown();
 }
 
-void MetaAggregatorNode::writeCompleteRounds(bool force) {
-  for (const pmeta::RoundBook::Round& round : book_.take(force)) {
-    log_.write(round);
+void MetaAggregatorNode::collectCompleteRounds(bool force) {
+  for (pmeta::RoundBook::Round& round : book_.take(force)) {
     const RoundSummary before = summary_;
     summary_ = toMsg(round.summary, experiment_);
     summary_.refused = before.refused;
@@ -294,7 +346,41 @@ void MetaAggregatorNode::writeCompleteRounds(bool force) {
             (excluded.empty() ? "" : "; the updates left out are those of " + taskNames(excluded)));
     const std::string line = console_.take(round);
     if (!line.empty()) ROS_INFO("%s", line.c_str());
+    unwritten_.push_back(std::move(round));
   }
+}
+
+// what the disk refuses is kept and tried again: nothing goes on without it
+void MetaAggregatorNode::writeDown() {
+  if (unwritten_.empty() && !unpublished_) return;
+  if (!disk_trouble_.empty() && Clock::now() < next_attempt_ && !stop_) return;
+  try {
+    for (; !unwritten_.empty(); unwritten_.pop_front()) log_->write(unwritten_.front());
+    if (unpublished_) {
+      saveCheckpoint();
+      unpublished_ = false;
+      publishMetaPolicy();
+    }
+    if (!disk_trouble_.empty()) {
+      disk_trouble_.clear();
+      ROS_INFO("the results can be written again; the run goes on.");
+      publishRound(RoundSummary::RUNNING, "running");
+    }
+  } catch (const pmeta::Error& error) {
+    next_attempt_ = Clock::now() + kRetryDisk;
+    if (disk_trouble_ == error.what()) return;
+    disk_trouble_ = error.what();
+    ROS_ERROR("%s The run is held until that is mended; it is tried again every %d s.",
+              error.what(), static_cast<int>(kRetryDisk.count()));
+    publishRound(RoundSummary::RUNNING, "");
+  }
+}
+
+void MetaAggregatorNode::saveCheckpoint() {
+  const int round = aggregator_.metaPolicy().round;
+  if (!experiment_.checkpointsAfter(round) && round != checkpoint_round_) return;
+  log_->sync();
+  checkpoints_.save(round, State{aggregator_, book_});
 }
 
 void MetaAggregatorNode::publishMetaPolicy() {
@@ -303,6 +389,9 @@ void MetaAggregatorNode::publishMetaPolicy() {
   // the initial one is never evaluated
   meta.evaluate = meta.round > 0 && evaluate_.exchange(false);
   last_is_out_ = meta.round == rounds;
+  meta.incarnation = incarnation_;
+  meta.checkpoint = checkpoint_wanted_.exchange(false);
+  if (meta.checkpoint) checkpoint_round_ = meta.round + 1;
   auto msg = boost::make_shared<pmeta_msgs::MetaPolicy>(toMsg(meta, rounds));
   msg->header.stamp = ros::Time::now();
   sign(authenticator_, *msg);
@@ -317,10 +406,13 @@ void MetaAggregatorNode::publishMetaPolicy() {
 
 void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& message) {
   const bool paused = pause_announced_ && state == RoundSummary::RUNNING;
-  const bool silent = !silent_.empty() && !paused && state == RoundSummary::RUNNING;
+  const bool blocked = !disk_trouble_.empty() && state == RoundSummary::RUNNING;
+  const bool silent = !silent_.empty() && !paused && !blocked && state == RoundSummary::RUNNING;
   if (silent) state = RoundSummary::LATE;
-  summary_.state = paused ? static_cast<std::uint8_t>(RoundSummary::PAUSED) : state;
-  summary_.message = paused   ? kPaused + (message.empty() ? "" : "; " + message)
+  if (blocked) state = RoundSummary::BLOCKED;
+  summary_.state = paused && !blocked ? static_cast<std::uint8_t>(RoundSummary::PAUSED) : state;
+  summary_.message = blocked  ? disk_trouble_ + kHeld
+                     : paused ? kPaused + (message.empty() ? "" : "; " + message)
                      : silent ? silenceText() + "; " + message
                               : message;
   summary_.header.stamp = ros::Time::now();
@@ -336,9 +428,10 @@ void MetaAggregatorNode::reportHealth() {
   const std::uint8_t state = summary_.state;
   const std::lock_guard<std::mutex> lock(health_mutex_);
   health_report_ = {};
-  health_report_.level = state == RoundSummary::LATE      ? HealthReport::kWarn
-                         : state == RoundSummary::STOPPED ? HealthReport::kError
-                                                          : HealthReport::kOk;
+  health_report_.level = state == RoundSummary::LATE ? HealthReport::kWarn
+                         : state == RoundSummary::STOPPED || state == RoundSummary::BLOCKED
+                             ? HealthReport::kError
+                             : HealthReport::kOk;
   health_report_.summary = summary_.message;
   health_report_.values = {{"rounds complete", std::to_string(summary_.round)},
                            {"rounds in all", std::to_string(summary_.rounds)},
@@ -442,6 +535,22 @@ std::string MetaAggregatorNode::taskNames(const std::vector<int>& tasks) const {
 HealthReport MetaAggregatorNode::health() {
   const std::lock_guard<std::mutex> lock(health_mutex_);
   return health_report_;
+}
+
+void announceStop(const pmeta::Experiment& experiment, const std::string& why) {
+  ros::NodeHandle nh;
+  const ros::Publisher publisher = nh.advertise<RoundSummary>("round", 1, true);
+  RoundSummary summary;
+  summary.run_id = experiment.settings().run_id;
+  summary.experiment = experiment.settings().experiment;
+  summary.rounds = static_cast<std::uint32_t>(experiment.settings().rounds);
+  summary.personal_return = summary.meta_return = summary.test_return = std::nan("");
+  summary.state = RoundSummary::STOPPED;
+  summary.message = why;
+  summary.header.stamp = ros::Time::now();
+  sign(pmeta::Authenticator(experiment.settings().key_file), summary);
+  publisher.publish(summary);
+  ros::WallDuration(1).sleep();
 }
 
 }  // namespace pmeta_nodes

@@ -11,6 +11,8 @@
 
 #include <atomic>
 #include <chrono>
+#include <deque>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -21,6 +23,7 @@
 #include "health.h"
 #include "mailbox.h"
 #include "pmeta_core/run/authentication.h"
+#include "pmeta_core/run/checkpoint.h"
 #include "pmeta_core/run/console.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/meta_aggregator.h"
@@ -37,6 +40,10 @@ namespace pmeta_nodes {
 /// round_timeout, once a quorum of updates is. Who has not been heard of for 1.5 s, or is late, is
 /// named on `round`: since when, and what happens next.
 ///
+/// After each checkpoint.interval-th round the state is saved before the meta-policy goes out, so
+/// that whoever has seen a round can count on it. While the disk takes nothing, the round in hand
+/// is held, `round` says why, and writing is tried again.
+///
 /// The service `pause` (true) holds the next meta-policy back, so that agents wait once the round
 /// in hand is done; `pause` (false) lets the run go on. Only time passes: the result is the same.
 /// The service `evaluate` has agents evaluate the next meta-policy, and the personal policies that
@@ -45,7 +52,8 @@ class MetaAggregatorNode {
  public:
   /// Creates the run folder; throws pmeta::Error if that cannot be.
   /// hold: stay after the last round, so that the scene and latched topics can be looked at.
-  MetaAggregatorNode(const pmeta::Experiment& experiment, bool hold);
+  /// resume: go on with the run that the folder holds, if it holds one, from the newest checkpoint.
+  MetaAggregatorNode(const pmeta::Experiment& experiment, bool hold, bool resume);
   ~MetaAggregatorNode();
 
   /// Spins until the run has ended (and, with hold, the node is stopped). Returns the exit code.
@@ -56,6 +64,17 @@ class MetaAggregatorNode {
   using Message =
       std::variant<pmeta_msgs::AuxiliaryUpdate::ConstPtr, pmeta_msgs::TaskReturn::ConstPtr>;
 
+  /// What a checkpoint holds.
+  struct State {
+    pmeta::MetaAggregator& aggregator;
+    pmeta::RoundBook& book;
+
+    void saveState(pmeta::StateWriter& writer) const;
+    void loadState(pmeta::StateReader& reader);
+  };
+
+  std::unique_ptr<pmeta::RunLog> openLog(bool resume);
+  bool onSaveCheckpoint(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool onEvaluate(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   void work();
@@ -66,7 +85,9 @@ class MetaAggregatorNode {
   void refuse(const std::string& reason);
   void refuseUpdate(const pmeta_msgs::AuxiliaryUpdate& msg, const std::string& reason);
   void closeRoundIfDue();
-  void writeCompleteRounds(bool force);
+  void collectCompleteRounds(bool force);
+  void writeDown();
+  void saveCheckpoint();
   void publishMetaPolicy();
   void announcePause();
   void publishRound(std::uint8_t state, const std::string& message);
@@ -82,9 +103,16 @@ class MetaAggregatorNode {
   const pmeta::Experiment& experiment_;
   const bool hold_;
   const pmeta::Authenticator authenticator_;
+  const std::uint64_t incarnation_ = ros::WallTime::now().toNSec();
   pmeta::MetaAggregator aggregator_;  ///< the worker's, as are book_ and log_
   pmeta::RoundBook book_;
-  pmeta::RunLog log_;
+  pmeta::CheckpointFolder checkpoints_;
+  std::unique_ptr<pmeta::RunLog> log_;             ///< none: the run was finished before
+  std::deque<pmeta::RoundBook::Round> unwritten_;  ///< complete rounds on their way to the disk
+  bool unpublished_ = false;        ///< a closed round's meta-policy waits for the disk
+  std::string disk_trouble_;        ///< why writing failed; "" while it works
+  Clock::time_point next_attempt_;  ///< to write
+  int checkpoint_round_ = 0;        ///< for which a checkpoint was asked
   pmeta::RunConsole console_;
   Clock::time_point round_start_;
   Clock::time_point next_announcement_;
@@ -104,12 +132,14 @@ class MetaAggregatorNode {
   ros::Subscriber status_sub_;
   ros::ServiceServer pause_service_;
   ros::ServiceServer evaluate_service_;
+  ros::ServiceServer checkpoint_service_;
   Mailbox<Message> mailbox_;
 
   std::atomic<bool> stop_{false};
   std::atomic<bool> paused_{false};
   std::atomic<bool> evaluate_{false};     ///< the next meta-policy
   std::atomic<bool> last_is_out_{false};  ///< of the meta-policies
+  std::atomic<bool> checkpoint_wanted_{false};
   std::atomic<bool> rounds_over_{false};  ///< nothing is left to pause
   std::atomic<bool> done_{false};
   std::atomic<bool> failed_{false};
@@ -118,5 +148,8 @@ class MetaAggregatorNode {
   std::unique_ptr<Health> health_;
   std::thread worker_;
 };
+
+/// Tells whoever follows the run that it cannot go on; takes a second, for them to hear it.
+void announceStop(const pmeta::Experiment& experiment, const std::string& why);
 
 }  // namespace pmeta_nodes

@@ -25,7 +25,7 @@ constexpr char kHelp[] =
 
   rosrun pmeta_nodes prepare_run CONFIG AGENTS_LAUNCH [--record] [key:=value ...]
 
-CONFIG         settings file
+CONFIG         settings file; with resume:=RUN_DIR the run there goes on, with its own settings
 AGENTS_LAUNCH  launch file to write: a task_agent for each training and test task and, with --record, rosbag
 key:=value     settings that override the file's; an empty value leaves the file's. The value of
                `settings` is itself a list of assignments: "settings:=slip=0.1 beta=0.5".
@@ -64,6 +64,17 @@ std::vector<std::string> readAssignments(const std::vector<std::string>& words) 
   return assignments;
 }
 
+// the value of `key`, "" if there is none, taken out of the assignments
+std::string takeAssignment(std::vector<std::string>& assignments, const std::string& key) {
+  const auto found = std::find_if(
+      assignments.begin(), assignments.end(),
+      [&](const std::string& assignment) { return assignment.rfind(key + ":=", 0) == 0; });
+  if (found == assignments.end()) return "";
+  const std::string value = found->substr(key.size() + 2);
+  assignments.erase(found);
+  return value;
+}
+
 std::string escapeXml(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -94,6 +105,7 @@ std::string agentsLaunch(const Experiment& experiment, bool record) {
     xml << "  <node name=\"task_agent_" << task
         << "\" pkg=\"pmeta_nodes\" type=\"task_agent\" respawn=\"true\" respawn_delay=\"1\">\n"
         << "    <param name=\"task\" value=\"" << task << "\"/>\n"
+        << "    <param name=\"resume\" value=\"true\"/>\n"
         << "  </node>\n";
   }
   if (record) {
@@ -130,13 +142,21 @@ int prepare(std::vector<std::string> words) {
   const std::filesystem::path launch_file = words[1];
   words.erase(words.begin(), words.begin() + 2);
 
-  const Experiment experiment = Experiment::load(config, readAssignments(words));
+  std::vector<std::string> assignments = readAssignments(words);
+  const std::string resume = takeAssignment(assignments, "resume");
+  const Experiment experiment = resume.empty() ? Experiment::load(config, assignments)
+                                               : Experiment::resume(resume, assignments, config);
   const pmeta::Authenticator probe(experiment.settings().key_file);
-  pmeta::requireWritable(experiment.settings().results_dir + "/" +
-                         experiment.settings().experiment);
-  if (!pmeta::runStatus(experiment.runDir()).empty()) {
-    throw Error("the run folder " + experiment.runDir() +
-                " already holds a run: choose another run_id.");
+  if (resume.empty()) {
+    pmeta::requireWritable(experiment.settings().results_dir + "/" +
+                           experiment.settings().experiment);
+    if (!pmeta::runStatus(experiment.runDir()).empty()) {
+      throw Error("the run folder " + experiment.runDir() +
+                  " already holds a run: choose another run_id, or go on with it by resume:=" +
+                  experiment.runDir() + ".");
+    }
+  } else {
+    pmeta::requireResumable(experiment.runDir());
   }
   for (const std::string& note : experiment.notes()) std::cerr << "pmeta: " << note << "\n";
   std::cerr << "settings\n" << experiment.table();

@@ -4,6 +4,7 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 
+#include "conversions.h"
 #include "node_main.h"
 
 namespace {
@@ -28,12 +29,17 @@ constexpr double kFarewell = 0.5;
 int guard(const pmeta::Experiment& experiment) {
   const bool hold = ros::NodeHandle("~").param("hold", false);
   const std::string run_id = experiment.settings().run_id;
+  const pmeta::Authenticator authenticator(experiment.settings().key_file);
   int code = -1;
   ros::NodeHandle nh;
   const ros::Subscriber rounds = nh.subscribe<RoundSummary>(
       "round", 8,
       boost::function<void(const RoundSummary::ConstPtr&)>([&](const RoundSummary::ConstPtr& msg) {
         if (msg->run_id != run_id) return;
+        if (pmeta_nodes::authenticate(authenticator, *msg) != pmeta::Authenticity::kAuthentic) {
+          ROS_WARN_THROTTLE(10, "ignoring news of the run that is not authentic.");
+          return;
+        }
         if (msg->state == RoundSummary::FINISHED) code = 0;
         if (msg->state == RoundSummary::STOPPED) code = 1;
       }));

@@ -12,6 +12,7 @@ constexpr char kHelp[] =
 private parameters
   ~task         index of the task, from 0 (required); test tasks come after the training tasks,
                 and only evaluate the meta-policy
+  ~resume       begin with the newest checkpoint of the run folder (default false)
   ~config_file  settings file; by default the parameter `config` of the namespace is read
 subscribes   meta_policy, round
 publishes    auxiliary, returns, agent_status, task_<i>/trajectory, /diagnostics
@@ -27,7 +28,8 @@ int runAgent(const pmeta::Experiment& experiment) {
     throw pmeta::Error("task is " + std::to_string(task) + " but must be from 0 to " +
                        std::to_string(experiment.totalTasks() - 1) + ".");
   }
-  return pmeta_nodes::TaskAgentNode(experiment, task).spin();
+  const bool resume = ros::NodeHandle("~").param("resume", false);
+  return pmeta_nodes::TaskAgentNode(experiment, task, resume).spin();
 }
 
 }  // namespace

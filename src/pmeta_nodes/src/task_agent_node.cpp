@@ -42,9 +42,11 @@ const char* stateName(std::uint8_t state) {
 
 }  // namespace
 
-TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task)
+TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task, bool resume)
     : experiment_(experiment),
+      resume_(resume),
       agent_(experiment, task),
+      checkpoints_(experiment, task, agent_.layout()),
       authenticator_(experiment.settings().key_file) {
   status_.run_id = experiment.settings().run_id;
   status_.task = static_cast<std::uint32_t>(task);
@@ -120,10 +122,13 @@ void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::ConstPtr& msg) {
     // a newer meta-policy shows that the aggregator has all we owed it for the rounds before
     const std::lock_guard<std::mutex> lock(mutex_);
     const int round = static_cast<int>(msg->round);
-    if (round <= newest_round_) return;
+    const bool started_again = msg->incarnation > incarnation_;
+    if (msg->incarnation < incarnation_ || (!started_again && round <= newest_round_)) return;
     newest_round_ = round;
-    const auto confirmed = [round](const auto& sent) {
-      return static_cast<int>(sent.round) <= round;
+    incarnation_ = msg->incarnation;
+    // what an aggregator that was started again lacks is made anew from its meta-policy
+    const auto confirmed = [&](const auto& sent) {
+      return started_again || static_cast<int>(sent.round) <= round;
     };
     unconfirmed_updates_.erase(
         std::remove_if(unconfirmed_updates_.begin(), unconfirmed_updates_.end(), confirmed),
@@ -194,6 +199,7 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
   }
 
   const int round = meta.round + 1;
+  returnTo(meta);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.round = static_cast<std::uint32_t>(round);
@@ -215,6 +221,7 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     status_.loss = result->loss;
     status_.distance_to_meta = result->distance;
   }
+  if (experiment_.checkpointsAfter(round) || meta.checkpoint) saveCheckpoint(round);
   // before the aggregator can end the run, and with it this process
   if (round == rounds) savePersonal();
   if (result->personal) deliver(*result->personal);
@@ -223,6 +230,41 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     publishEpisode(agent_.recordPersonal(), round, pmeta::Policy::kPersonal);
   }
   setState(AgentStatus::WAITING, "waiting for the meta-policy of round " + std::to_string(round));
+}
+
+// whoever has just been started, or has run ahead of the meta-policy, goes where that is
+void TaskAgentNode::returnTo(const pmeta::MetaPolicy& meta) {
+  const int have = agent_.round();
+  const bool ahead = have > meta.round + 1;
+  const bool started = have == 0 && meta.round > 0 && resume_;
+  const bool may_have_sent = have == 0 && meta.round == 0 && resume_;
+  if (!ahead && !started && !may_have_sent) return;
+  std::vector<std::string> refused;
+  const int round = checkpoints_.newest(meta.round + 1, refused);
+  for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
+  if (ahead) agent_ = pmeta::TaskAgent(experiment_, agent_.task());
+  if (round > 0) checkpoints_.load(round, agent_);
+  saved_round_ = round;
+  if (round > 0) ROS_INFO("%s goes on after round %d.", status_.task_name.c_str(), round);
+  if (round < meta.round) {
+    ROS_WARN("%s has lost what it learnt in the rounds %d to %d: no good checkpoint is newer.",
+             status_.task_name.c_str(), round + 1, meta.round);
+  }
+}
+
+void TaskAgentNode::saveCheckpoint(int round) {
+  if (round == saved_round_) return;
+  std::string trouble;
+  try {
+    checkpoints_.save(round, agent_);
+    saved_round_ = round;
+  } catch (const pmeta::Error& error) {
+    // training goes on: what is at stake is only how much a crash would cost
+    trouble = error.what();
+    ROS_ERROR("%s The run goes on without this checkpoint.", error.what());
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  checkpoint_trouble_ = trouble;
 }
 
 void TaskAgentNode::savePersonal() const {
@@ -302,8 +344,10 @@ void TaskAgentNode::publishStatus() {
 HealthReport TaskAgentNode::health() {
   const std::lock_guard<std::mutex> lock(mutex_);
   HealthReport report;
-  report.level = status_.state == AgentStatus::FAILED ? HealthReport::kError : HealthReport::kOk;
-  report.summary = status_.message;
+  report.level = status_.state == AgentStatus::FAILED ? HealthReport::kError
+                 : !checkpoint_trouble_.empty()       ? HealthReport::kWarn
+                                                      : HealthReport::kOk;
+  report.summary = checkpoint_trouble_.empty() ? status_.message : checkpoint_trouble_;
   report.values = {{"state", stateName(status_.state)},
                    {"round", std::to_string(status_.round)},
                    {"updates/s", pmeta::formatNumber(status_.updates_per_s)},

@@ -20,6 +20,7 @@
 #include "health.h"
 #include "mailbox.h"
 #include "pmeta_core/run/authentication.h"
+#include "pmeta_core/run/checkpoint.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/task_agent.h"
 #include "refusals.h"
@@ -31,11 +32,14 @@ namespace pmeta_nodes {
 /// Subscribes to meta_policy and round; publishes auxiliary, returns, agent_status and
 /// task_<i>/trajectory. What the aggregator must get is sent again until a newer meta-policy, or
 /// the end of the run, shows that it has it. With a key_file, what it sends is signed and what is
-/// not authentic it ignores. The last round's personal policy stays on this
+/// not authentic it ignores. A checkpoint is on the disk before that round's update is sent, so an
+/// agent that is killed comes back with all that anybody has seen of it; where the aggregator had
+/// to go back some rounds, the agent follows. The last round's personal policy stays on this
 /// machine, as policies/task_<i>.safetensors of the run folder.
 class TaskAgentNode {
  public:
-  TaskAgentNode(const pmeta::Experiment& experiment, int task);
+  /// resume: begin with the newest checkpoint in the run folder, if there is one.
+  TaskAgentNode(const pmeta::Experiment& experiment, int task, bool resume);
   ~TaskAgentNode();
 
   /// Spins until stopped, or until some seconds after the run has ended. Returns the exit code.
@@ -50,6 +54,8 @@ class TaskAgentNode {
 
   void train();
   void trainFrom(const pmeta::MetaPolicy& meta);
+  void returnTo(const pmeta::MetaPolicy& meta);
+  void saveCheckpoint(int round);
   void savePersonal() const;
   void waitForAggregator();
   void deliver(const pmeta::TaskReturn& result);
@@ -61,7 +67,10 @@ class TaskAgentNode {
   HealthReport health();
 
   const pmeta::Experiment& experiment_;
-  pmeta::TaskAgent agent_;
+  const bool resume_;
+  pmeta::TaskAgent agent_;  ///< the trainer's, as are the two below
+  pmeta::CheckpointFolder checkpoints_;
+  int saved_round_ = 0;
   const pmeta::Authenticator authenticator_;
   ros::NodeHandle nh_;
   ros::Publisher auxiliary_pub_;
@@ -89,6 +98,8 @@ class TaskAgentNode {
   Clock::time_point next_resend_;
   std::chrono::seconds resend_wait_{2};
   int newest_round_ = -1;
+  std::uint64_t incarnation_ = 0;   ///< of the aggregator that it is from
+  std::string checkpoint_trouble_;  ///< why the last one could not be written; "" if it was
 
   std::unique_ptr<Health> health_;
   std::thread trainer_;

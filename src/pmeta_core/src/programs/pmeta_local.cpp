@@ -141,28 +141,20 @@ std::string takeResume(Arguments& arguments) {
       throw Error("resume:= needs the folder of a run.");
     }
   }
-  if (!dir.empty() && !others.empty()) {
-    throw Error("a run goes on with its own settings: leave out " + others.front() + ".");
-  }
   arguments.words = others;
   return dir;
 }
 
-Experiment resumedExperiment(const std::string& config, const std::string& dir) {
-  const std::string wanted = Experiment::load(config).settings().experiment;
-  Experiment experiment = Experiment::resume(dir);
-  if (experiment.settings().experiment != wanted) {
-    throw Error("the run in " + dir + " is of experiment '" + experiment.settings().experiment +
-                "', not of '" + wanted + "': give its own settings file.");
-  }
-  return experiment;
+Experiment loadExperiment(const std::string& config, const std::string& resume,
+                          const Arguments& arguments) {
+  return resume.empty() ? Experiment::load(config, arguments.words)
+                        : Experiment::resume(resume, arguments.words, config);
 }
 
 int run(Arguments arguments) {
   const std::string config = takeConfig(arguments);
   const std::string resume = takeResume(arguments);
-  const Experiment experiment = resume.empty() ? Experiment::load(config, arguments.words)
-                                               : resumedExperiment(config, resume);
+  const Experiment experiment = loadExperiment(config, resume, arguments);
   pmeta::ResumePoint point;
   if (!resume.empty()) point = pmeta::findResumePoint(experiment);
   for (const std::string& sentence : point.refused) std::cerr << sentence << "\n";
@@ -219,7 +211,9 @@ int sweep(Arguments arguments) {
 
 int check(Arguments arguments) {
   const std::string config = takeConfig(arguments);
-  const Experiment experiment = Experiment::load(config, arguments.words);
+  const std::string resume = takeResume(arguments);
+  const Experiment experiment = loadExperiment(config, resume, arguments);
+  if (!resume.empty()) pmeta::requireResumable(experiment.runDir());
   const pmeta::Authenticator probe(experiment.settings().key_file);
   printNotes(experiment);
   std::cout << experiment.yaml();

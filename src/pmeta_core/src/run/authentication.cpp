@@ -125,7 +125,9 @@ Mac Authenticator::mac(const MetaPolicy& header, const ModelView& model, int rou
   stream.put(header.round);
   stream.put(rounds);
   stream.put(header.participants);
+  stream.put(header.incarnation);
   stream.put(static_cast<int>(header.evaluate));
+  stream.put(static_cast<int>(header.checkpoint));
   stream.put(model);
   return stream.finish();
 }

@@ -110,8 +110,8 @@ Experiment Experiment::parse(const std::string& text, const std::string& source,
   return build(parseYaml(text, source), source, overrides);
 }
 
-Experiment Experiment::resume(const std::string& run_dir,
-                              const std::vector<std::string>& overrides) {
+Experiment Experiment::resume(const std::string& run_dir, const std::vector<std::string>& overrides,
+                              const std::string& of_config) {
   namespace fs = std::filesystem;
   const fs::path dir = (fs::absolute(run_dir) / "").lexically_normal().parent_path();
   const std::string config = (dir / "config.yaml").string();
@@ -125,6 +125,11 @@ Experiment Experiment::resume(const std::string& run_dir,
     throw Error("the run folder " + dir.string() + " must be <results_dir>/" +
                 saved.settings().experiment + "/" + saved.settings().run_id +
                 ", as its config.yaml names it.");
+  }
+  const std::string name = saved.settings().experiment;
+  if (!of_config.empty() && load(of_config).settings().experiment != name) {
+    throw Error("the run in " + dir.string() + " is of experiment '" + name + "', not of " +
+                of_config + ": give its own settings file.");
   }
   std::vector<std::string> changed = overrides;
   changed.push_back(place);

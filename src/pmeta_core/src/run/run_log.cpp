@@ -271,7 +271,12 @@ RunLog RunLog::reopen(const Experiment& experiment, int rounds_done) {
   return log;
 }
 
-void RunLog::openCsv() { csv_.open(dir_ + "/rounds.csv", std::ios::app); }
+void RunLog::openCsv() {
+  csv_.open(dir_ + "/rounds.csv", std::ios::app);
+  std::error_code error;
+  csv_size_ = std::filesystem::file_size(dir_ + "/rounds.csv", error);
+  if (!csv_ || error) throw Error("cannot write " + dir_ + "/rounds.csv: is the disk full?");
+}
 
 void RunLog::sync() {
   const int file = ::open((dir_ + "/rounds.csv").c_str(), O_WRONLY | O_CLOEXEC);
@@ -282,12 +287,20 @@ void RunLog::sync() {
 }
 
 void RunLog::write(const RoundBook::Round& round) {
-  for (const RoundRow& row : round.rows) csv_ << csvLine(row) << "\n";
-  csv_.flush();
+  std::string lines;
+  for (const RoundRow& row : round.rows) lines += csvLine(row) + "\n";
+  if (!csv_.is_open()) openCsv();
+  csv_ << lines << std::flush;
   if (!csv_) {
-    throw Error("cannot write " + dir_ + "/rounds.csv (" + std::strerror(errno) +
-                "): is the disk full?");
+    const std::string why = std::strerror(errno);
+    // no half a round: whoever tries again finds the file as it was
+    csv_.close();
+    csv_.clear();
+    std::error_code ignored;
+    std::filesystem::resize_file(dir_ + "/rounds.csv", csv_size_, ignored);
+    throw Error("cannot write " + dir_ + "/rounds.csv (" + why + "): is the disk full?");
   }
+  csv_size_ += lines.size();
   rounds_done_ = round.summary.round;
 }
 

@@ -85,9 +85,11 @@ class Experiment {
 
   /// The experiment of a run folder, by its config.yaml; the folder may have been moved.
   /// `overrides` may set what does not define the run (see definingSettings()). Throws Error if
-  /// there is no run there, or on an override of anything else, which it names.
+  /// there is no run there, on an override of anything else, which it names, or if the settings
+  /// file `of_config`, if given, is of another experiment.
   static Experiment resume(const std::string& run_dir,
-                           const std::vector<std::string>& overrides = {});
+                           const std::vector<std::string>& overrides = {},
+                           const std::string& of_config = "");
 
   const ExperimentSettings& settings() const { return settings_; }
   const EnvFamily& family() const { return *family_; }

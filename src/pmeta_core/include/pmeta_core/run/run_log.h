@@ -92,7 +92,8 @@ class RunLog {
   /// is finished, or its files are not there.
   static RunLog reopen(const Experiment& experiment, int rounds_done);
 
-  /// Appends the round's rows and flushes them to disk.
+  /// Appends the round's rows and flushes them. Throws Error, e.g. if the disk is full; rounds.csv
+  /// is then as it was, and the same round can be tried again.
   void write(const RoundBook::Round& round);
 
   /// Waits until what has been written is on the disk.
@@ -116,6 +117,7 @@ class RunLog {
   std::string started_;
   int rounds_done_ = 0;
   std::ofstream csv_;
+  std::uintmax_t csv_size_ = 0;  // of whole rounds
 };
 
 /// Status in a run folder's manifest.json: "running", "finished", "stopped", "failed", or "" if
