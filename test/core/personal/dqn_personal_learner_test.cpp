@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../allocations.h"
+#include "../memory_state.h"
 #include "pmeta_core/env/cart_pole.h"
 
 namespace pmeta {
@@ -147,7 +148,7 @@ TEST(DqnPersonalLearner, RoundResetsParametersAndNothingElse) {
   learner.beginRound(meta, false);
   EXPECT_EQ(learner.personal().floats(), meta.floats());
   EXPECT_EQ(learner.auxiliary().floats(), meta.floats());
-  EXPECT_EQ(learner.optimizer().updates(), 10u);
+  EXPECT_EQ(test::stateOf(learner.optimizer()).get<std::int64_t>("updates").at(0), 10);
   EXPECT_EQ(learner.optimizer().firstMoment(), first);
   EXPECT_EQ(learner.optimizer().secondMoment(), second);
   EXPECT_EQ(learner.learner().targets(), targets);

@@ -65,7 +65,7 @@ TEST(ProximalAdam, AgreesWithKingmaAndBaInDouble) {
     }
   }
   for (std::size_t k = 0; k < n; ++k) EXPECT_NEAR(phi[k], x[k], 5e-6);
-  EXPECT_EQ(optimizer.updates(), 200u);
+  EXPECT_EQ(test::stateOf(optimizer).get<std::int64_t>("updates").at(0), 200);
 }
 
 class ProximalAdamOf : public ::testing::TestWithParam<bool> {};

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "../allocations.h"
+#include "../memory_state.h"
 #include "../support.h"
 #include "pmeta_core/aggregate/mix.h"
 
@@ -143,7 +144,7 @@ TEST(SacPersonalLearner, RoundResetsParametersAndNothingElse) {
   EXPECT_EQ(learner.personal().floats(), meta.floats());
   EXPECT_EQ(learner.learner().targets(), targets);
   EXPECT_EQ(learner.optimizer().firstMoment(), first);
-  EXPECT_EQ(learner.optimizer().updates(), 20u);
+  EXPECT_EQ(test::stateOf(learner.optimizer()).get<std::int64_t>("updates").at(0), 20);
   EXPECT_EQ(learner.learner().temperature().value(), temperature);
   EXPECT_EQ(learner.learner().replay().values(), replay);
   EXPECT_EQ(learner.learner().context().values(), context);
@@ -163,7 +164,7 @@ TEST(SacPersonalLearner, TargetsAndMomentsBeginAnewWhereSettingsSaySo) {
   for (std::size_t k = 0; k < learner.learner().targets().size(); ++k) {
     ASSERT_EQ(learner.learner().targets()[k], meta.floats()[offset + k]);
   }
-  EXPECT_EQ(learner.optimizer().updates(), 0u);
+  EXPECT_EQ(test::stateOf(learner.optimizer()).get<std::int64_t>("updates").at(0), 0);
   EXPECT_EQ(learner.optimizer().firstMoment(), AlignedFloats(meta.size()));
 }
 
