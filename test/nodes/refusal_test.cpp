@@ -25,7 +25,7 @@ class Refusal : public RunOverRos {
 
   // of task 0 in the aggregator's diagnostics
   std::string health() {
-    return health_["meta_aggregator: meta aggregator/" + experiment_.family().taskName(0)];
+    return health_["pmeta/meta_aggregator: meta aggregator/" + experiment_.family().taskName(0)];
   }
 
   // an update of task 0 that the aggregator would take, but for what `spoil` does to it
