@@ -95,6 +95,39 @@ def test_launching_with_bad_settings_starts_nothing(tmp_path):
     assert "started with pid" not in result.stdout
 
 
+def test_a_key_is_made_once_and_must_stay_private(tmp_path):
+    key = tmp_path / "run.key"
+    made = run([TOP / "pmeta", "key", key], timeout=600)
+    assert made.returncode == 0, made.stderr
+    assert key.stat().st_mode & 0o7777 == 0o600
+    text = key.read_text()
+    assert len(bytes.fromhex(text)) == 32 and text not in made.stdout + made.stderr
+    again = run([LOCAL, "key", key])
+    assert again.returncode == 1
+    assert again.stderr == ("pmeta: %s is there already and was left as it is: give a new name.\n"
+                            % key)
+    assert key.read_text() == text
+
+    key.chmod(0o640)
+    launch = run(["roslaunch", "pmeta_nodes", "gridworld.launch", "key_file:=%s" % key,
+                  "results_dir:=%s" % tmp_path], env=environment(tmp_path))
+    assert launch.returncode == 1
+    assert "has mode 0640, which lets others at it: run chmod 600" in launch.stdout + launch.stderr
+
+
+def test_nodes_of_a_plain_roslaunch_are_reached_from_this_machine_only(tmp_path):
+    env = environment(tmp_path)
+    del env["ROS_IP"]
+    addresses = {}
+    for name, value in (("", ""), ("ROS_IP", "10.1.2.3"), ("ROS_HOSTNAME", "robot")):
+        given = dict(env, **{name: value}) if name else env
+        command = run(["roslaunch", "--args", "/pmeta/task_agent_0", "pmeta_nodes",
+                       "gridworld.launch"], env=given)
+        assert command.returncode == 0, command.stderr
+        addresses[name] = 'ROS_IP="127.0.0.1"' in command.stdout
+    assert addresses == {"": True, "ROS_IP": False, "ROS_HOSTNAME": False}
+
+
 def test_launching_takes_any_setting(tmp_path):
     env = environment(tmp_path)
     result = run(["roslaunch", "pmeta_nodes", "gridworld.launch", "settings:=betta=1"], env=env)

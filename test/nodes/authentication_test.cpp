@@ -31,7 +31,7 @@ class Authentication : public RunOverRos {
   Authentication()
       : key_(experiment_.settings().key_file),
         other_key_(pmeta::Key{1, 2, 3}),
-        aggregator_("meta_aggregator: meta aggregator") {
+        aggregator_("pmeta/meta_aggregator: meta aggregator") {
     auxiliary_.pub = nh_.advertise<pmeta_msgs::AuxiliaryUpdate>("auxiliary", 100);
     returns_.pub = nh_.advertise<pmeta_msgs::TaskReturn>("returns", 100);
     meta_policies_.pub = nh_.advertise<pmeta_msgs::MetaPolicy>("meta_policy", 100);
@@ -176,7 +176,7 @@ class Authentication : public RunOverRos {
   }
 
   std::string agentHealth(int task) const {
-    return "task_agent_" + std::to_string(task) + ": task agent";
+    return "pmeta/task_agent_" + std::to_string(task) + ": task agent";
   }
 
   // messages that were looked at and not taken, by the aggregator and one agent
