@@ -3,7 +3,7 @@
 import numpy as np
 
 import pmeta_runs as pr
-from pmeta_drawing import folder_for, headline, panels
+from pmeta_drawing import folder_for, headline, panels, wrapped_name
 from pmeta_files import PlotError
 from pmeta_policies import policies_of
 
@@ -100,19 +100,20 @@ def action_values(text, run, views, figures, name):
     tasks, goals = chosen_tasks(run.num_tasks), goals_of(run)
     rows = [row for row in ROWS if row in views]
     figure, axes = panels(len(rows), len(tasks), panel_width=2.7)
+    figure.set_figheight(0.9 + 2.9 * len(rows))
     for row, name_of_row in zip(axes, rows):
         for axis, task in zip(row, tasks):
             low, high, image = draw_map(axis, views[name_of_row][task], goals[task])
-            axis.set_title("%s: %.4g to %.4g" % (ROWS[name_of_row], low, high), loc="left")
+            text_of_map = "%s: %.3g to %.3g" % (ROWS[name_of_row], low, high)
+            axis.set_title(text_of_map.replace("-", "−"), loc="left")
         row[0].set_ylabel("action along y")
     unknown = "meta" in rows and run.settings.get("sac.task_encoding", "inference") == "inference"
     for axis, task in zip(axes[-1], tasks):
-        axis.set_xlabel("action along x\n%s" % run.task_names[task])
+        axis.set_xlabel("action along x\n%s" % wrapped_name(run.task_names[task], 22))
     bar = figure.colorbar(image, ax=axes, shrink=0.6, aspect=35, ticks=[])
     bar.set_label("Q(start, action), from each map's lowest to its highest")
-    axes[0][0].legend(loc="lower left", bbox_to_anchor=(0, 1.12), ncol=2,
-                      borderaxespad=0).set_in_layout(True)
-    headline(figure, text + ("; MP before it explores" if unknown else ""))
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="upper right", ncol=2)
+    headline(figure, text + ("; MP before it explores" if unknown else "") + "\n")
     figures.save(figure, name)
 
 
@@ -124,7 +125,8 @@ def draw_map(axis, view, goal):
     image = axis.imshow(values, origin="lower", extent=(-1 - half, 1 + half) * 2, vmin=low,
                         vmax=high, cmap="viridis")
     axis.plot(*(goal / np.abs(goal).max()), marker="*", markersize=13, color="white",
-              markeredgecolor="black", linestyle="none", label="straight to the goal")
+              markeredgecolor="black", linestyle="none", clip_on=False,
+              label="straight to the goal")
     axis.plot(*view.action(), marker="o", markersize=7, color="white", markeredgecolor="black",
               linestyle="none", label="the policy's action")
     axis.set_xticks([-1, 0, 1])

@@ -77,8 +77,7 @@ Marker cellMarker(const ActionValuePlace& place, int id, const Values* values) {
   marker.action = values == nullptr ? Marker::DELETE : Marker::ADD;
   if (values == nullptr) return marker;
   const double size = place.side / values->cells();
-  // rviz leaves gaps between squares that only just touch
-  marker.scale.x = marker.scale.y = 1.1 * size;
+  marker.scale.x = marker.scale.y = size;
   for (int row = 0; row < values->cells(); ++row) {
     for (int column = 0; column < values->cells(); ++column) {
       geometry_msgs::Point point;
@@ -98,6 +97,9 @@ void drawAxes(Figure& figure, const ActionValuePlace& place, const Values& value
   const auto [x, y] = place.corner;
   const double line = 0.035 * s;
   figure.rectangle(x - line, y - line, x + s + line, y + s + line, color);
+  figure.raise();
+  // seen where squares leave a gap
+  figure.rectangle(x, y, x + s, y + s, viridis(0.5));
   for (const double action : {-1.0, 0.0, 1.0}) {
     const double at = values.along(action) * s;
     figure.rectangle(x + at - line / 2, y - kTick * s - line, x + at + line / 2, y, color);
