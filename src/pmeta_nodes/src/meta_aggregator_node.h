@@ -73,6 +73,8 @@ class MetaAggregatorNode {
     void loadState(pmeta::StateReader& reader);
   };
 
+  static const char kPaused[];
+
   std::unique_ptr<pmeta::RunLog> openLog(bool resume);
   bool onSaveCheckpoint(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
