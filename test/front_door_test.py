@@ -61,7 +61,7 @@ def test_a_misspelt_key_in_a_file_is_named_with_its_line(tmp_path):
 
 BAD_WORDS = [
     (["fuzz", "yaml"],
-     "unknown target 'yaml'; known are: csv layout message policy replay settings."),
+     "unknown target 'yaml'; known are: checkpoint csv layout message policy replay settings."),
     (["fuzz", "csv", "--seconds"], "--seconds needs a whole number, at least 1."),
     (["fuzz", "csv", "--seconds", "1m"], "--seconds needs a whole number, at least 1."),
     (["test", "--msan"], "unknown option '--msan' of test: see ./pmeta --help."),

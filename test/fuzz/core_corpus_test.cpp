@@ -3,6 +3,7 @@
 namespace pmeta::fuzz {
 namespace {
 
+TEST(FuzzCorpus, Checkpoint) { replayCorpus("checkpoint", fuzzCheckpoint); }
 TEST(FuzzCorpus, Csv) { replayCorpus("csv", fuzzCsv); }
 TEST(FuzzCorpus, Layout) { replayCorpus("layout", fuzzLayout); }
 TEST(FuzzCorpus, Policy) { replayCorpus("policy", fuzzPolicy); }

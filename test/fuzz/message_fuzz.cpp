@@ -1,5 +1,6 @@
 #include <pmeta_msgs/AuxiliaryUpdate.h>
 #include <pmeta_msgs/MetaPolicy.h>
+#include <pmeta_msgs/RoundSummary.h>
 #include <pmeta_msgs/TaskReturn.h>
 #include <ros/serialization.h>
 
@@ -43,8 +44,9 @@ struct Bounded {
 
 template <template <class> class Msg>
 bool read(const std::string& bytes, Msg<std::allocator<void>>& msg) {
+  const auto size = static_cast<std::uint32_t>(bytes.size());
   std::vector<std::uint8_t> buffer(bytes.begin(), bytes.end());
-  const auto size = static_cast<std::uint32_t>(buffer.size());
+  buffer.push_back(0);  // roscpp counts on from where the message begins: not from null
   try {
     Msg<Bounded<void>> probe;
     ser::IStream first(buffer.data(), size);
@@ -105,6 +107,25 @@ void offer(const pmeta_msgs::AuxiliaryUpdate& msg) {
   requireFinite(aggregator.metaPolicy().model);
 }
 
+void take(const pmeta_msgs::MetaPolicy& msg) {
+  const MetaPolicy meta = pmeta_nodes::fromMsg(msg);
+  const std::size_t scalar = meta.model.layout.precision() == Precision::kFloat32 ? 4 : 8;
+  require(meta.model.byteCount() == meta.model.size() * scalar,
+          "a model is of another size than its layout");
+  checkModel(meta.model, meta.model.layout, "the aggregator");
+}
+
+// nobody without the key signs, and what is signed with it is taken
+template <class Msg>
+void checkMac(Msg msg) {
+  static const Authenticator kAuthenticator{Key{1, 2, 3}};
+  require(pmeta_nodes::authenticate(kAuthenticator, msg) != Authenticity::kAuthentic,
+          "a MAC is forged");
+  pmeta_nodes::sign(kAuthenticator, msg);
+  require(pmeta_nodes::authenticate(kAuthenticator, msg) == Authenticity::kAuthentic,
+          "a MAC of our own is not recognised");
+}
+
 }  // namespace
 
 // a letter that says the type, then a message as it comes over the wire; of a capital letter's
@@ -117,22 +138,25 @@ void fuzzMessage(const std::uint8_t* data, std::size_t size) {
   pmeta_msgs::AuxiliaryUpdate update;
   pmeta_msgs::MetaPolicy meta;
   pmeta_msgs::TaskReturn result;
+  pmeta_msgs::RoundSummary summary;
   try {
     if ((type == 'a' || type == 'A') && read<pmeta_msgs::AuxiliaryUpdate_>(bytes, update)) {
       if (type == 'A') mend(update.model);
+      checkMac(update);
       offer(update);
     } else if ((type == 'm' || type == 'M') && read<pmeta_msgs::MetaPolicy_>(bytes, meta)) {
       if (type == 'M') mend(meta.model);
-      const MetaPolicy back = pmeta_nodes::fromMsg(meta);
-      require(
-          back.model.byteCount() / (back.model.layout.precision() == Precision::kFloat32 ? 4 : 8) ==
-              back.model.size(),
-          "a model is of another size than its layout");
-      checkModel(back.model, back.model.layout, "the aggregator");
+      checkMac(meta);
+      take(meta);
     } else if (type == 'r' && read<pmeta_msgs::TaskReturn_>(bytes, result)) {
-      const TaskReturn back = pmeta_nodes::fromMsg(result);
-      const auto again = pmeta_nodes::toMsg(back, result.task_name);
+      checkMac(result);
+      const auto again = pmeta_nodes::toMsg(pmeta_nodes::fromMsg(result), result.task_name);
       require(again.task == result.task && again.round == result.round, "a return changes");
+    } else if (type == 's' && read<pmeta_msgs::RoundSummary_>(bytes, summary)) {
+      checkMac(summary);
+      const auto again = pmeta_nodes::toMsg(pmeta_nodes::fromMsg(summary), experiment());
+      require(again.round == summary.round && again.missing == summary.missing,
+              "a summary changes");
     }
   } catch (const Error&) {
   }

@@ -246,16 +246,23 @@ TEST_F(Privacy, EveryArrayHoldsParametersOrNamesTasks) {
   std::set<std::uint32_t> senders;
   for (const auto& msg : allOf<pmeta_msgs::AuxiliaryUpdate>(recording_.ofPrivate())) {
     EXPECT_EQ(fromMsg(msg.model).layout.text(), layout.text());
+    EXPECT_TRUE(msg.mac.empty());  // a run without a key signs nothing
     senders.insert(msg.task);
   }
   EXPECT_EQ(static_cast<int>(senders.size()), experiment_.numTasks());
   for (const auto& msg : allOf<pmeta_msgs::MetaPolicy>(recording_.ofPrivate())) {
     EXPECT_EQ(fromMsg(msg.model).layout.text(), layout.text());
+    EXPECT_TRUE(msg.mac.empty());
     EXPECT_LE(msg.participants.size(), tasks);
   }
   for (const auto& msg : allOf<pmeta_msgs::RoundSummary>(recording_.ofPrivate())) {
     EXPECT_LE(msg.participants.size(), tasks);
     EXPECT_LE(msg.missing.size(), tasks);
+    EXPECT_LE(msg.excluded.size(), tasks);
+    EXPECT_TRUE(msg.mac.empty());
+  }
+  for (const auto& msg : allOf<pmeta_msgs::TaskReturn>(recording_.ofPrivate())) {
+    EXPECT_TRUE(msg.mac.empty());
   }
   // texts could hold arrays too
   for (const auto& msg : allOf<pmeta_msgs::AgentStatus>(recording_.ofPrivate())) {
