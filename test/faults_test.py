@@ -2,13 +2,14 @@
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import time
 
 import pytest
 
-from programs import CONFIG, LOCAL, environment, run
+from programs import CONFIG, LOCAL, TOP, environment, run
 
 SETTINGS = ["rounds:=1000", "pace:=0.05", "run_id:=faults"]
 
@@ -174,3 +175,25 @@ def test_while_checkpoints_cannot_be_written_the_run_is_held_and_says_why(tmp_pa
         launched.wait(timeout=60)
     assert "the results can be written again; the run goes on." in log.read_text()
     assert rows(folder) == undisturbed(tmp_path)
+
+
+def test_chaos_loses_nothing_and_says_so_in_a_table(tmp_path):
+    chaos = TOP / "src/pmeta_nodes/scripts/chaos.py"
+    done = run(["/usr/bin/python3", chaos, "gridworld", "--kills", "4", "--seed", "1", "--keep",
+                tmp_path / "chaos"], env=environment(tmp_path), timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    names, values = [re.split(r"  +", line) for line in done.stdout.splitlines()[-2:]]
+    row = dict(zip(names, values))
+    assert row["rounds"] == "20 of 20"
+    assert row["result"] == "identical"
+    assert row["bytes lost"] == "0"
+    kills = [int(word) for word in re.findall(r"\d+", row["kills"])]
+    assert sum(kills) == 4
+    assert int(row["late"]) > 0 and int(row["corrupted"]) > 0
+
+
+def test_chaos_names_an_experiment_that_it_does_not_know(tmp_path):
+    chaos = TOP / "src/pmeta_nodes/scripts/chaos.py"
+    done = run(["/usr/bin/python3", chaos, "ant"], env=environment(tmp_path))
+    assert done.returncode == 1
+    assert done.stderr == "pmeta: unknown experiment 'ant': chaos knows gridworld, cart_pole.\n"

@@ -351,7 +351,7 @@ def chaos(arguments):
     if options.keep and work.exists():
         raise ChaosError("%s exists already: choose another folder." % work)
     work.mkdir(parents=True, exist_ok=True)
-    call(TOP / "pmeta", "key", work / "key")
+    call(LOCAL, "key", work / "key")
     if options.netns:
         options.kills = 0
     reports = [Run(name, options, work).report() for name in options.experiments or EXPERIMENTS]

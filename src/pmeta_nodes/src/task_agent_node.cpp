@@ -240,10 +240,16 @@ void TaskAgentNode::returnTo(const pmeta::MetaPolicy& meta) {
   const bool may_have_sent = have == 0 && meta.round == 0 && resume_;
   if (!ahead && !started && !may_have_sent) return;
   std::vector<std::string> refused;
-  const int round = checkpoints_.newest(meta.round + 1, refused);
-  for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
+  int round = checkpoints_.newest(meta.round + 1, refused);
   if (ahead) agent_ = pmeta::TaskAgent(experiment_, agent_.task());
-  if (round > 0) checkpoints_.load(round, agent_);
+  try {
+    if (round > 0) checkpoints_.load(round, agent_);
+  } catch (const pmeta::Error& error) {
+    refused.push_back(error.what());
+    agent_ = pmeta::TaskAgent(experiment_, agent_.task());
+    round = 0;
+  }
+  for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
   saved_round_ = round;
   if (round > 0) ROS_INFO("%s goes on after round %d.", status_.task_name.c_str(), round);
   if (round < meta.round) {
