@@ -56,13 +56,15 @@ TEST(Conversions, ModelsKeepEveryBit) {
 }
 
 TEST(Conversions, MetaPolicyRoundTrip) {
-  const pmeta::MetaPolicy meta = {"run", 3, networkModel(), {0, 2}, true};
+  const pmeta::MetaPolicy meta = {"run", 3, networkModel(), {0, 2}, true, 7, true};
   const pmeta_msgs::MetaPolicy msg = overTheWire(toMsg(meta, 10));
   EXPECT_EQ(msg.rounds, 10u);
   const pmeta::MetaPolicy back = fromMsg(msg);
   EXPECT_EQ(back.run_id, "run");
   EXPECT_EQ(back.round, 3);
   EXPECT_TRUE(back.evaluate);
+  EXPECT_EQ(back.incarnation, 7u);
+  EXPECT_TRUE(back.checkpoint);
   EXPECT_EQ(back.participants, (std::vector<int>{0, 2}));
   EXPECT_TRUE(back.model == meta.model);
 }

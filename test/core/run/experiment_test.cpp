@@ -254,7 +254,7 @@ TEST(Experiment, LoadReadsAFile) {
 
 TEST(Experiment, TheRepositorysConfigsAreValid) {
   const std::filesystem::path config =
-      std::filesystem::path(__FILE__).parent_path() / "../../../config";
+      std::filesystem::path(PMETA_TEST_DATA).parent_path() / "../config";
   for (const std::string name :
        {"gridworld", "gridworld_conflict", "cart_pole", "mountain_car", "half_cheetah_dir",
         "half_cheetah_vel", "ant_fwd_back", "walker_2d_params", "sparse_point_robot"}) {

@@ -16,9 +16,9 @@ struct MetaPolicy {
   int round = 0;
   Model model;
   std::vector<int> participants;  ///< tasks in this aggregation, ascending; empty for round 0
+  bool evaluate = false;  ///< somebody wants this and the personal policies after it evaluated
   std::uint64_t incarnation = 0;  ///< of the aggregator; one started again may go back to a round
   bool checkpoint = false;        ///< all are to save one after the round that begins with this
-  bool evaluate = false;  ///< somebody wants this one and the personal policies after it evaluated
 };
 
 /// What an agent sends at the end of its round: auxiliary (or, when averaging, personal)
