@@ -9,6 +9,7 @@ import sys
 import time
 
 import pytest
+import yaml
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "src/pmeta_nodes/scripts"))
 import pmeta_bags
@@ -135,9 +136,10 @@ def test_launching_takes_any_setting(tmp_path):
     assert "unknown setting 'betta'" in result.stderr
     result = run(["roslaunch", "--dump-params", "pmeta_nodes", "gridworld.launch",
                   "settings:=slip=0.1 sizes=[3,4]", "seed:=5"], env=env)
-    assert "slip: [0.1]" in result.stdout
-    assert "sizes: [3, 4]" in result.stdout
-    assert "seed: 5" in result.stdout
+    settings = yaml.safe_load(result.stdout)["/pmeta/config"]
+    assert "slip: [0.1]" in settings
+    assert "sizes: [3, 4]" in settings
+    assert "seed: 5" in settings
 
 
 def test_the_launch_file_starts_an_agent_for_each_task_of_the_settings(tmp_path):
