@@ -305,7 +305,6 @@ void MetaAggregatorNode::closeRoundIfDue() {
   book_.closeRound(round, aggregator_.metaPolicy().participants, missing, seconds,
                    aggregator_.excluded());
   unpublished_ = true;
-  next_attempt_ = Clock::now();
   writeDown();
 }
 
@@ -366,14 +365,15 @@ void MetaAggregatorNode::saveCheckpoint() {
 
 void MetaAggregatorNode::publishMetaPolicy() {
   const int rounds = experiment_.settings().rounds;
-  pmeta::MetaPolicy meta = aggregator_.metaPolicy();
-  // the initial one is never evaluated
-  meta.evaluate = meta.round > 0 && evaluate_.exchange(false);
-  last_is_out_ = meta.round == rounds;
-  meta.incarnation = incarnation_;
-  meta.checkpoint = checkpoint_wanted_.exchange(false);
-  if (meta.checkpoint) checkpoint_round_ = meta.round + 1;
+  const pmeta::MetaPolicy& meta = aggregator_.metaPolicy();
   auto msg = boost::make_shared<pmeta_msgs::MetaPolicy>(toMsg(meta, rounds));
+  // the initial one is never evaluated
+  msg->evaluate = static_cast<std::uint8_t>(meta.round > 0 && evaluate_.exchange(false));
+  last_is_out_ = meta.round == rounds;
+  msg->incarnation = incarnation_;
+  const bool checkpoint = checkpoint_wanted_.exchange(false);
+  msg->checkpoint = static_cast<std::uint8_t>(checkpoint);
+  if (checkpoint) checkpoint_round_ = meta.round + 1;
   msg->header.stamp = ros::Time::now();
   sign(authenticator_, *msg);
   meta_msg_ = msg;

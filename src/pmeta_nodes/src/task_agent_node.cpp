@@ -236,9 +236,9 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
 void TaskAgentNode::returnTo(const pmeta::MetaPolicy& meta) {
   const int have = agent_.round();
   const bool ahead = have > meta.round + 1;
-  const bool started = have == 0 && meta.round > 0 && resume_;
-  const bool may_have_sent = have == 0 && meta.round == 0 && resume_;
-  if (!ahead && !started && !may_have_sent) return;
+  // at round 0 too: it may have ended between saving and sending round 1
+  const bool started = have == 0 && resume_;
+  if (!ahead && !started) return;
   std::vector<std::string> refused;
   int round = checkpoints_.newest(meta.round + 1, refused);
   if (ahead) agent_ = pmeta::TaskAgent(experiment_, agent_.task());
