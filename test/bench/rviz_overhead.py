@@ -1,9 +1,10 @@
 #!/usr/bin/python3
-"""What watching a run costs its agents: pairs of runs of cart_pole's preset quick, with rviz and
-without, first one and then the other first. rviz draws on a screen in memory (Xvfb).
+"""What watching a run costs its agents: pairs of runs of cart_pole, with rviz and without, first one
+and then the other first. rviz draws on a screen in memory (Xvfb).
 
-The measure is the user CPU time of the task agents' processes, which what else runs on the machine
-changes less than the wall time from their start to the last round.
+The measures are the user CPU time of the task agents' processes, which what else runs on the machine
+changes less, and the wall time from their start to the last round. Beside them stands the CPU time
+of rviz and the viewer, which run at idle priority: what it got for drawing while the agents trained.
 """
 
 import glob
@@ -36,15 +37,11 @@ def stat_of(pid):
     return text[text.index("(") + 1:text.rindex(")")], text[text.rindex(")") + 2:].split()
 
 
-def agents_of(launch):
-    """Processes of task agents whose parent is the launch."""
-    found = {}
-    for path in glob.glob("/proc/[0-9]*"):
-        pid = os.path.basename(path)
-        stat = stat_of(pid)
-        if stat and stat[0] == "task_agent" and int(stat[1][1]) == launch:
-            found[pid] = stat[1]
-    return found
+def cpu_of(launch, names):
+    """User CPU seconds of each process with one of the names whose parent is the launch."""
+    stats = (stat_of(os.path.basename(path)) for path in glob.glob("/proc/[0-9]*"))
+    return [int(stat[1][11]) / TICKS for stat in stats
+            if stat and stat[0] in names and int(stat[1][1]) == launch]
 
 
 def finished(folder):
@@ -55,7 +52,7 @@ def finished(folder):
 
 
 def run(with_rviz, display, settings):
-    """(user CPU seconds of all agents, wall seconds)"""
+    """(user CPU seconds of all agents, wall seconds, user CPU seconds of rviz and the viewer)"""
     with tempfile.TemporaryDirectory() as folder:
         environment = dict(os.environ, DISPLAY=display, ROS_HOME=folder, XDG_RUNTIME_DIR=folder,
                            ROS_MASTER_URI="http://127.0.0.1:%d" % free_port(),
@@ -63,8 +60,8 @@ def run(with_rviz, display, settings):
         watched = "true" if with_rviz else "false"
         with open(os.path.join(folder, "launch.log"), "w") as log:
             launch = subprocess.Popen(
-                ["roslaunch", "pmeta_nodes", "cart_pole.launch", "preset:=quick", "hold:=true",
-                 "rviz:=" + watched, "results_dir:=" + folder] + settings,
+                ["roslaunch", "pmeta_nodes", "cart_pole.launch", "hold:=true", "rviz:=" + watched,
+                 "results_dir:=" + folder] + settings,
                 env=environment, stdout=log, stderr=log)
         try:
             limit, start = time.monotonic() + LIMIT, None
@@ -72,12 +69,12 @@ def run(with_rviz, display, settings):
                 if launch.poll() is not None or time.monotonic() > limit:
                     with open(os.path.join(folder, "launch.log")) as log:
                         sys.exit("rviz_overhead: the run has not finished:\n" + log.read()[-2000:])
-                if start is None and agents_of(launch.pid):
+                if start is None and cpu_of(launch.pid, ["task_agent"]):
                     start = time.monotonic()
                 time.sleep(0.05)
             wall = time.monotonic() - start
-            agents = agents_of(launch.pid)
-            return sum(int(fields[11]) for fields in agents.values()) / TICKS, wall
+            return (sum(cpu_of(launch.pid, ["task_agent"])), wall,
+                    sum(cpu_of(launch.pid, ["rviz", "trajectory_view"])))
         finally:
             launch.send_signal(signal.SIGINT)
             launch.wait()
@@ -95,15 +92,15 @@ def main(arguments):
         display = ":" + number.readline().strip()
     try:
         print("agents' user CPU and wall time in s; load %.1f" % os.getloadavg()[0])
-        print("pair   CPU without     with    ratio    wall without     with    ratio")
+        print("pair   CPU without     with    ratio    wall without     with    ratio    rviz's CPU")
         ratios = []
         for pair in range(pairs):
             order = (False, True) if pair % 2 == 0 else (True, False)
             results = {watched: run(watched, display, settings) for watched in order}
-            (cpu, wall), (cpu_rviz, wall_rviz) = results[False], results[True]
+            (cpu, wall, _), (cpu_rviz, wall_rviz, drawing) = results[False], results[True]
             ratios.append((cpu_rviz / cpu, wall_rviz / wall))
-            print("%4d %13.2f %8.2f %8.3f %15.1f %8.1f %8.3f"
-                  % (pair + 1, cpu, cpu_rviz, ratios[-1][0], wall, wall_rviz, ratios[-1][1]),
+            print("%4d %13.2f %8.2f %8.3f %15.1f %8.1f %8.3f %13.2f"
+                  % (pair + 1, cpu, cpu_rviz, ratios[-1][0], wall, wall_rviz, ratios[-1][1], drawing),
                   flush=True)
         medians = [statistics.median(column) for column in zip(*ratios)]
         print("median of ratios: CPU %.3f, wall %.3f" % tuple(medians))
