@@ -247,7 +247,12 @@ TEST(CheckpointFolder, AFullDiskLeavesTheOlderOnes) {
   rlimit small = before;
   small.rlim_cur = 4096;
   setrlimit(RLIMIT_FSIZE, &small);
+  const auto openFiles = [] {
+    return std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator());
+  };
+  const auto open_before = openFiles();
   const std::string error = errorOf([&] { folder.save(3, agent); });
+  EXPECT_EQ(openFiles(), open_before);
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   EXPECT_NE(error.find("cannot write the checkpoint"), std::string::npos) << error;

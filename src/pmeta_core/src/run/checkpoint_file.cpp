@@ -56,7 +56,8 @@ std::string lastError() { return std::strerror(errno); }
 /// A file descriptor, closed at the end of the scope.
 class Descriptor {
  public:
-  Descriptor(const std::string& path, int flags) : fd_(::open(path.c_str(), flags | O_CLOEXEC)) {}
+  Descriptor(const std::string& path, int flags)
+      : fd_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {}
   ~Descriptor() {
     if (fd_ >= 0) ::close(fd_);
   }
@@ -232,14 +233,13 @@ void syncFolder(const std::string& dir) {
   }
 }
 
-// without room HDF5 would fail in the middle: rather ask before
-void requireRoom(const std::string& dir, std::uint64_t bytes) {
-  std::error_code error;
-  const auto space = std::filesystem::space(dir, error);
-  if (error || space.available >= bytes) return;
-  throw Error("the disk of " + dir + " has room for " + std::to_string(space.available >> 20) +
-              " MB but a checkpoint takes " + std::to_string((bytes >> 20) + 1) +
-              " MB: make room, or choose another results_dir.");
+// HDF5 keeps a file, and its memory, that it could not write to the end: rather find out before
+void requireRoom(const std::string& path, std::uint64_t bytes) {
+  const Descriptor fd(path, O_WRONLY | O_CREAT | O_TRUNC);
+  if (fd >= 0) errno = ::posix_fallocate(fd, 0, static_cast<off_t>(bytes));
+  if (fd >= 0 && errno == 0) return;
+  throw Error("cannot write the checkpoint " + path + " of " + std::to_string((bytes >> 20) + 1) +
+              " MB (" + lastError() + "): make room, or choose another results_dir.");
 }
 
 void writeIdentity(StateWriter& writer, const CheckpointIdentity& identity) {
@@ -266,8 +266,8 @@ void writeCheckpoint(const std::string& path, const CheckpointIdentity& identity
   const std::string temporary = path + ".tmp";
   SizeCounter counter;
   counter.part("state", State{save});
-  requireRoom(dir, counter.bytes() + kOverhead);
   try {
+    requireRoom(temporary, counter.bytes() + kOverhead);
     {
       const Hdf5Lock lock;
       Hdf5Writer writer(temporary);
