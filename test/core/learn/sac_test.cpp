@@ -450,6 +450,36 @@ TEST(Sac, ContextIsWarmUpAndPriorEpisodesInTheRewardThatCounts) {
   EXPECT_LT(context.size(), replay.size() / 2);
 }
 
+TEST(Sac, TheExplorerActsInPriorEpisodesOnly) {
+  SacSettings settings = smallSettings("inference");
+  settings.context.buffer_size = 1000;
+  Trainer trainer(settings);
+  const SacLearner& learner = trainer.learner;
+  const SacNetworks& networks = learner.networks();
+  const std::vector<float> explorer(networks.actor().size(), 0.1f);
+  SacNetworks::ActorWorkspace workspace(networks, 1);
+  GaussianPolicy policy(networks.actionSize(), 1);
+  trainer.learner.collect(trainer.parameters.data(), trainer.rng, explorer.data());
+  int in_prior = 0;
+  for (int i = 0; i < 400; ++i) {
+    const std::vector<float> z = learner.taskInput();
+    const std::size_t context = learner.context().size();
+    Rng same = trainer.rng;
+    trainer.learner.collect(trainer.parameters.data(), trainer.rng, explorer.data());
+    const bool prior = learner.context().size() > context;
+    in_prior += prior;
+    const Transition t = learner.replay()[learner.replay().size() - 1];
+    policy.sample(networks.heads(prior ? explorer.data() : trainer.parameters.data(), t.observation,
+                                 1, z.data(), workspace),
+                  1, same);
+    for (std::size_t j = 0; j < networks.actionSize(); ++j) {
+      ASSERT_EQ(t.action[j], policy.actions()[j]) << "step " << i << (prior ? ", prior" : "");
+    }
+  }
+  EXPECT_GT(in_prior, 100);
+  EXPECT_LT(in_prior, 300);
+}
+
 TEST(Sac, GreedyActionsAreTanhOfTheMean) {
   const Trainer trainer(smallSettings("one_hot"));
   const SacNetworks& networks = trainer.learner.networks();

@@ -119,6 +119,29 @@ TEST(SacPersonalLearner, UpdatesAreTheLearnersByAdamWithPull) {
   EXPECT_NE(omega, meta.floats());
 }
 
+TEST(SacPersonalLearner, TheMetaPolicyExploresForContext) {
+  for (const std::string explorer : {"meta", "personal"}) {
+    SacSettings settings = smallSettings("inference");
+    settings.context.explorer = explorer;
+    auto learner = makeLearner(settings);
+    SacLearner plain(std::make_unique<Goal>(0), settings);
+    const Model meta = learner.initialModel(1);
+    std::vector<float> phi = meta.floats(), omega = phi;
+    ProximalAdam adam(phi.data(), omega.data(), phi.size(), pulled());
+    plain.resetTargets(phi.data());
+    learner.beginRound(meta, false);
+    Rng rng(5, 0, Stream::kSample), same = rng;
+    for (int r = 0; r < 30; ++r) {
+      learner.update(rng);
+      plain.collect(phi.data(), same, explorer == "meta" ? meta.floats().data() : phi.data());
+      adam.beginUpdate();
+      plain.update(phi.data(), adam, same);
+    }
+    EXPECT_EQ(learner.learner().replay().values(), plain.replay().values()) << explorer;
+    EXPECT_EQ(learner.personal().floats(), phi) << explorer;
+  }
+}
+
 TEST(SacPersonalLearner, RoundResetsParametersAndNothingElse) {
   auto learner = makeLearner(smallSettings("inference"));
   Rng rng(1, 0, Stream::kSample);

@@ -43,6 +43,9 @@ void bind(Settings& s, const std::string& prefix, ContextSettings& c) {
   s.bind(prefix + "prior_interval", c.prior_interval,
          "every how-many-th training episode acts on z from the prior and becomes context",
          Range::between(1, 1e6));
+  s.bind(prefix + "context_explorer", c.explorer,
+         "who acts in these episodes: meta (the meta-policy, as at test time) or personal",
+         {"meta", "personal"});
   s.bind(prefix + "exploration_episodes", c.exploration_episodes,
          "episodes at test time before z is fixed", Range::between(1, 1000));
   s.bind(prefix + "exploration_noise", c.exploration_noise,

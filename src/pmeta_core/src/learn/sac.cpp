@@ -86,15 +86,15 @@ void SacLearner::resetTargets(const float* parameters) {
   }
 }
 
-std::int64_t SacLearner::collect(const float* parameters, Rng& rng) {
+std::int64_t SacLearner::collect(const float* parameters, Rng& rng, const float* explorer) {
   int warm_up_steps = 0;
   if (!started_) {
     started_ = true;
     warm_up_steps = settings_.warm_up_steps;
     beginEpisode(parameters, true, rng);
-    for (int t = 0; t < warm_up_steps; ++t) step(parameters, true, rng);
+    for (int t = 0; t < warm_up_steps; ++t) step(parameters, explorer, true, rng);
   }
-  for (int t = 0; t < settings_.env_steps_per_update; ++t) step(parameters, false, rng);
+  for (int t = 0; t < settings_.env_steps_per_update; ++t) step(parameters, explorer, false, rng);
   return warm_up_steps + settings_.env_steps_per_update;
 }
 
@@ -112,12 +112,13 @@ void SacLearner::beginEpisode(const float* parameters, bool warm_up, Rng& rng) {
   task_input_ = update_input_;
 }
 
-void SacLearner::step(const float* parameters, bool warm_up, Rng& rng) {
+void SacLearner::step(const float* parameters, const float* explorer, bool warm_up, Rng& rng) {
   if (warm_up) {
     for (float& a : action_float_) a = static_cast<float>(2 * rng.uniform() - 1);
   } else {
+    const float* actor = prior_episode_ && explorer != nullptr ? explorer : parameters;
     acting_policy_.sample(
-        networks_.heads(parameters, observation_.data(), 1, task_input_.data(), acting_), 1, rng);
+        networks_.heads(actor, observation_.data(), 1, task_input_.data(), acting_), 1, rng);
     std::copy_n(acting_policy_.actions(), action_size_, action_float_.begin());
   }
   std::copy(action_float_.begin(), action_float_.end(), action_.begin());

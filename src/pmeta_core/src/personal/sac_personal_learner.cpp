@@ -93,13 +93,19 @@ void SacPersonalLearner::beginRound(const Model& meta, bool keep_personal) {
   const SacSettings& settings = learner_.settings();
   if (!has_personal_ || settings.targets_at_round == "meta") learner_.resetTargets(values.data());
   if (settings.reset_moments) optimizer_.reset();
+  const SacNetworks& networks = learner_.networks();
+  if (networks.hasEncoder() && settings.context.explorer == "meta") {
+    explorer_.assign(values.begin(),
+                     values.begin() + static_cast<std::ptrdiff_t>(networks.actor().size()));
+  }
   has_personal_ = true;
 }
 
 UpdateStats SacPersonalLearner::update(Rng& rng) {
   const float* parameters = personal_.floats().data();
   UpdateStats stats;
-  stats.env_steps = learner_.collect(parameters, rng);
+  stats.env_steps =
+      learner_.collect(parameters, rng, explorer_.empty() ? nullptr : explorer_.data());
   optimizer_.beginUpdate();
   stats.loss = learner_.update(parameters, optimizer_, rng).critic;
   stats.updates = 1;

@@ -427,6 +427,8 @@ std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
     SacSettings sac = e.sac;
     // nothing is learnt on a test task: no replay
     if (isTestTask(task)) sac.buffer_size = sac.batch_size;
+    // where nothing comes back the first meta-policy would explore for ever
+    if (!evaluatesMeta()) sac.context.explorer = "personal";
     return std::make_unique<SacPersonalLearner>(make_env, sac, optimizer, task, numTasks(),
                                                 lambdas);
   }

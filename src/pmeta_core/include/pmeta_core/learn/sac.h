@@ -54,8 +54,9 @@ class SacLearner {
   /// env_steps_per_update steps by samples of the policy, kept in the replay; the first call also
   /// starts the environment and warms it up. With an encoder, z is drawn anew for each episode:
   /// from the prior in every prior_interval-th, whose transitions become context, else from q(z|c).
+  /// There `explorer` acts instead, if not null: another actor's parameters.
   /// Returns the transitions made. Allocates nothing once the buffers are full.
-  std::int64_t collect(const float* parameters, Rng& rng);
+  std::int64_t collect(const float* parameters, Rng& rng, const float* explorer = nullptr);
 
   /// One batch from the replay. Hands `optimizer` the gradients of critic 1 and 2 (whose targets
   /// follow in the same pass), of the encoder, and, with the moved critics, of the actor; last, the
@@ -81,7 +82,7 @@ class SacLearner {
 
  private:
   void beginEpisode(const float* parameters, bool warm_up, Rng& rng);
-  void step(const float* parameters, bool warm_up, Rng& rng);
+  void step(const float* parameters, const float* explorer, bool warm_up, Rng& rng);
   void sampleContext(Rng& rng);
   void sampleBatch(Rng& rng);
   void drawTask(const float* parameters, Rng& rng);

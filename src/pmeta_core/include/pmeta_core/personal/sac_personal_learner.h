@@ -72,6 +72,7 @@ class SacPersonalLearner : public PersonalLearner {
   Model auxiliary_;
   bool has_personal_ = false;
   std::vector<std::pair<std::size_t, std::size_t>> own_;  // [begin, end) that no round resets
+  std::vector<float> explorer_;  // the meta-policy's actor of the round, where it explores
   ProximalAdam optimizer_;
   std::unique_ptr<Evaluation> evaluation_;
   std::unique_ptr<SacNetworks::ActorWorkspace> evaluation_workspace_;
