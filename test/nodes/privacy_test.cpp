@@ -109,10 +109,13 @@ class EpisodeValues {
   std::size_t size() const { return values_.size(); }
   const std::set<double>& values() const { return values_; }
 
-  /// Where one of them stands in the bytes, as float64, float32 or text; "" if none does.
+  /// Where one of them stands in the bytes, as float64 or text, or two in a row as float32; "" if
+  /// none does. One float32 says nothing: of thousands of parameters some equal one by chance.
   std::string findIn(const std::vector<std::uint8_t>& bytes) const {
     for (std::size_t at = 0; at + sizeof(float) <= bytes.size(); ++at) {
-      if (holds(floats_, bytes, at)) return "float32 at byte " + std::to_string(at);
+      if (holds(floats_, bytes, at) && holds(floats_, bytes, at + sizeof(float))) {
+        return "two float32 at byte " + std::to_string(at);
+      }
       if (holds(doubles_, bytes, at)) return "float64 at byte " + std::to_string(at);
     }
     const std::string text(bytes.begin(), bytes.end());
@@ -314,7 +317,7 @@ TEST_F(Privacy, TheSearchFindsEachNumberInWhateverFormItIsHidden) {
     blob.float64_values = {0.25, value};
     EXPECT_NE(values.findIn(serialized(blob)), "");
     blob.float64_values.clear();
-    blob.float32_values = {0.25f, static_cast<float>(value)};
+    blob.float32_values = {0.25f, static_cast<float>(value), static_cast<float>(value)};
     EXPECT_NE(values.findIn(serialized(blob)), "");
     pmeta_msgs::AgentStatus status;
     status.message = "at " + pmeta::formatNumber(value) + " now";
