@@ -158,15 +158,20 @@ def compare(name, bench, rounds):
     title, _, layer, *_ = UPDATES[name]
     print(f"\n{title}\n")
     core_type = blas_kernels(*layer)
-    configured = dict(KEEP_MEMORY, **({"OPENBLAS_CORETYPE": core_type} if core_type else {}))
+    kernels = {"OPENBLAS_CORETYPE": core_type} if core_type else {}
+    kernels_text = f"{core_type or 'the dispatched'} kernels"
 
     variants = check_same_work(name)
-    cases = [(OUT_OF_THE_BOX, {})] + [(variant, configured) for variant in variants]
+    groups = {"with no settings": [({}, OUT_OF_THE_BOX)],
+              kernels_text: [(kernels, variant) for variant in variants],
+              f"{kernels_text}, memory kept": [({**kernels, **KEEP_MEMORY}, variant)
+                                               for variant in variants]}
+    cases = [case for group in groups.values() for case in group]
     times = [[] for _ in cases]
     pmeta = []
     for _ in range(rounds):
         pmeta.append(pmeta_seconds(name, bench))
-        for found, (variant, settings) in zip(times, cases):
+        for found, (settings, variant) in zip(times, cases):
             found.append(measured(settings, name, variant))
 
     # of all rounds, the best percentile and the median of the medians
@@ -181,13 +186,16 @@ def compare(name, bench, rounds):
         ms, median = over_rounds(found)
         print(f"{label:44} {ms:6.2f} {median:7.2f} {pmeta_ms:9.2f} {ms / pmeta_ms:6.2f}")
 
-    row("PyTorch, " + OUT_OF_THE_BOX, times[0])
-    print(f"PyTorch, memory kept, {core_type or 'the dispatched'} kernels:")
-    for (variant, _), found in zip(cases[1:], times[1:]):
-        row("  " + variant, found)
-    ordinary = [found for (variant, _), found in zip(cases, times) if "by hand" not in variant]
-    row("  the best of these with autograd", min(ordinary, key=over_rounds))
-    row("  the best of all", min(times, key=over_rounds))
+    remaining = iter(times)
+    for title, group in groups.items():
+        print(f"PyTorch, {title}:")
+        found = [(variant, next(remaining)) for _, variant in group]
+        for variant, its_times in found:
+            row("  " + variant, its_times)
+        if len(found) > 1:
+            with_autograd = [t for variant, t in found if "by hand" not in variant]
+            row("  the best of these with autograd", min(with_autograd, key=over_rounds))
+            row("  the best of these", min((t for _, t in found), key=over_rounds))
     print(f"{'pMeta':44} {pmeta_ms:6.2f} {pmeta_median:7.2f} {pmeta_ms:9.2f} {1:6.2f}", flush=True)
 
 

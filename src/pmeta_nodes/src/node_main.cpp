@@ -1,5 +1,7 @@
 #include "node_main.h"
 
+#include <malloc.h>
+
 #include <atomic>
 #include <csignal>
 #include <cstring>
@@ -15,6 +17,8 @@ namespace {
 std::atomic<bool> g_stop{false};
 std::unique_ptr<MasterWatch> g_master;
 
+constexpr int kGivenBack = 1 << 20;  // bytes of a block that the system gets back when it is freed
+
 void onSignal(int) { g_stop = true; }
 
 }  // namespace
@@ -27,6 +31,8 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
       return 0;
     }
   }
+  // models come and go as messages of megabytes; glibc would come to keep them all
+  mallopt(M_MMAP_THRESHOLD, kGivenBack);
   // our own handlers: the last words of a run are published before ROS goes down
   ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
   std::signal(SIGINT, onSignal);

@@ -450,6 +450,23 @@ TEST(Sac, ContextIsWarmUpAndPriorEpisodesInTheRewardThatCounts) {
   EXPECT_LT(context.size(), replay.size() / 2);
 }
 
+TEST(Sac, PosteriorEpisodesAreContextWhereAskedFor) {
+  SacSettings settings = smallSettings("inference");
+  settings.context.prior_interval = 3;
+  settings.context.posterior_episodes = true;
+  settings.context.buffer_size = settings.buffer_size;
+  Trainer trainer(settings);
+  for (int i = 0; i < 200; ++i) {
+    trainer.learner.collect(trainer.parameters.data(), trainer.rng);
+  }
+  const ReplayBuffer &replay = trainer.learner.replay(), &context = trainer.learner.context();
+  ASSERT_EQ(context.size(), replay.size());
+  for (std::size_t k = 0; k < replay.size(); ++k) {
+    ASSERT_EQ(context[k].observation[0], replay[k].observation[0]) << k;
+    EXPECT_EQ(context[k].reward, replay[k].action[0]) << "the sparse reward";
+  }
+}
+
 TEST(Sac, TheExplorerActsInPriorEpisodesOnly) {
   SacSettings settings = smallSettings("inference");
   settings.context.buffer_size = 1000;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "../allocations.h"
@@ -97,26 +98,43 @@ TEST(SacPersonalLearner, LayoutNamesEveryNetwork) {
   EXPECT_NE(text.find("encoder.layer2.weight 4 5\n"), std::string::npos);
 }
 
+// what a personal learner is made of, moved by hand
+struct Parts {
+  Parts(const SacSettings& settings, const Model& meta, std::vector<float> task_input = {})
+      : learner(std::make_unique<Goal>(0), settings, std::move(task_input)),
+        phi(meta.floats()),
+        omega(phi),
+        adam(phi.data(), omega.data(), phi.size(), pulled()) {
+    learner.resetTargets(phi.data());
+  }
+
+  // steps made and loss
+  std::pair<std::int64_t, double> update(const std::vector<float>& explorer, Rng& rng) {
+    const std::int64_t steps = learner.collect(phi.data(), rng, explorer.data());
+    adam.beginUpdate();
+    return {steps, learner.update(phi.data(), adam, rng).critic};
+  }
+
+  SacLearner learner;
+  std::vector<float> phi, omega;
+  ProximalAdam adam;
+};
+
 TEST(SacPersonalLearner, UpdatesAreTheLearnersByAdamWithPull) {
   auto learner = makeLearner();
   const Model meta = learner.initialModel(1);
-  SacLearner plain(std::make_unique<Goal>(0), smallSettings(), oneHot(1, kTasks));
-  std::vector<float> phi = meta.floats(), omega = phi;
-  ProximalAdam adam(phi.data(), omega.data(), phi.size(), pulled());
-  plain.resetTargets(phi.data());
+  Parts parts(smallSettings(), meta, oneHot(1, kTasks));
   learner.beginRound(meta, false);
   Rng rng(5, 0, Stream::kSample), same = rng;
   for (int r = 0; r < 30; ++r) {
     const UpdateStats stats = learner.update(rng);
-    EXPECT_EQ(stats.env_steps, plain.collect(phi.data(), same));
-    adam.beginUpdate();
-    EXPECT_EQ(stats.loss, plain.update(phi.data(), adam, same).critic);
+    EXPECT_EQ(std::make_pair(stats.env_steps, stats.loss), parts.update(parts.phi, same));
     EXPECT_EQ(stats.updates, 1);
   }
-  EXPECT_EQ(learner.personal().floats(), phi);
-  EXPECT_EQ(learner.auxiliary().floats(), omega);
-  EXPECT_NE(phi, omega);
-  EXPECT_NE(omega, meta.floats());
+  EXPECT_EQ(learner.personal().floats(), parts.phi);
+  EXPECT_EQ(learner.auxiliary().floats(), parts.omega);
+  EXPECT_NE(parts.phi, parts.omega);
+  EXPECT_NE(parts.omega, meta.floats());
 }
 
 TEST(SacPersonalLearner, TheMetaPolicyExploresForContext) {
@@ -124,21 +142,16 @@ TEST(SacPersonalLearner, TheMetaPolicyExploresForContext) {
     SacSettings settings = smallSettings("inference");
     settings.context.explorer = explorer;
     auto learner = makeLearner(settings);
-    SacLearner plain(std::make_unique<Goal>(0), settings);
     const Model meta = learner.initialModel(1);
-    std::vector<float> phi = meta.floats(), omega = phi;
-    ProximalAdam adam(phi.data(), omega.data(), phi.size(), pulled());
-    plain.resetTargets(phi.data());
+    Parts parts(settings, meta);
     learner.beginRound(meta, false);
     Rng rng(5, 0, Stream::kSample), same = rng;
     for (int r = 0; r < 30; ++r) {
       learner.update(rng);
-      plain.collect(phi.data(), same, explorer == "meta" ? meta.floats().data() : phi.data());
-      adam.beginUpdate();
-      plain.update(phi.data(), adam, same);
+      parts.update(explorer == "meta" ? meta.floats() : parts.phi, same);
     }
-    EXPECT_EQ(learner.learner().replay().values(), plain.replay().values()) << explorer;
-    EXPECT_EQ(learner.personal().floats(), phi) << explorer;
+    EXPECT_EQ(learner.learner().replay().values(), parts.learner.replay().values()) << explorer;
+    EXPECT_EQ(learner.personal().floats(), parts.phi) << explorer;
   }
 }
 

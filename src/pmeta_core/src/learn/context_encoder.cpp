@@ -43,8 +43,10 @@ void bind(Settings& s, const std::string& prefix, ContextSettings& c) {
   s.bind(prefix + "prior_interval", c.prior_interval,
          "every how-many-th training episode acts on z from the prior and becomes context",
          Range::between(1, 1e6));
+  s.bind(prefix + "context_posterior", c.posterior_episodes,
+         "the other episodes, on z from q(z|c), become context as well");
   s.bind(prefix + "context_explorer", c.explorer,
-         "who acts in these episodes: meta (the meta-policy, as at test time) or personal",
+         "who acts on z from the prior: meta (the meta-policy, as at test time) or personal",
          {"meta", "personal"});
   s.bind(prefix + "exploration_episodes", c.exploration_episodes,
          "episodes at test time before z is fixed", Range::between(1, 1000));

@@ -129,7 +129,7 @@ void SacLearner::step(const float* parameters, const float* explorer, bool warm_
                         step.terminated ? 0.0f : static_cast<float>(settings_.gamma),
                         next_observation_float_.data()};
   replay_.add(transition);
-  if (networks_.hasEncoder() && prior_episode_) {
+  if (networks_.hasEncoder() && (prior_episode_ || settings_.context.posterior_episodes)) {
     transition.reward = static_cast<float>(step.evaluatedReward());
     context_.add(transition);
   }

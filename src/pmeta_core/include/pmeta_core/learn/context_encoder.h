@@ -22,7 +22,10 @@ struct ContextSettings {
   /// While training, every how-many-th episode acts on z from the prior. These, and the random
   /// steps of the warm-up, are the context: it then looks as at test time. 1: every episode.
   int prior_interval = 2;
-  /// Whose actor acts in those episodes: "meta" (the meta-policy's of the round, which also explores
+  /// The other episodes, which act on z from q(z|c), are context as well (PEARL's, where the reward
+  /// is sparse): else hardly any context would show a reward.
+  bool posterior_episodes = false;
+  /// Whose actor acts on z from the prior: "meta" (the meta-policy's of the round, which also explores
   /// at test time) or "personal".
   std::string explorer = "meta";
   /// The meta-policy is evaluated before it has explored the task, and after so many episodes of
