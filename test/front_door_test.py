@@ -229,6 +229,22 @@ def test_an_interrupted_sweep_keeps_what_is_finished(tmp_path):
     assert statuses.count("finished") >= 1 and statuses.count("running") == 0
 
 
+def test_a_second_interrupt_does_not_wait_for_the_round(tmp_path):
+    command = [LOCAL, "run", CONFIG, "rounds:=1", "updates_per_round:=1000000000",
+               "results_dir:=%s" % tmp_path]
+    process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, universal_newlines=True)
+    while not list(tmp_path.glob("gridworld/*/rounds.csv")):
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    assert process.stderr.readline() == "\n"
+    assert "once more stops at once" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGINT
+
+
 def test_the_launch_ends_by_itself_and_interrupting_it_leaves_what_was_done(tmp_path):
     env = environment(tmp_path)
     command = ["roslaunch", "pmeta_nodes", "gridworld.launch", "pace:=0.1",

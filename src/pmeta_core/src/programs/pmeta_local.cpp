@@ -66,7 +66,13 @@ is unambiguous (lambda for personal.lambda). Results go to results_dir, by defau
 
 std::atomic<bool> g_stop{false};
 
-void onSignal(int) { g_stop = true; }
+// a round of large networks takes minutes, and only whole ones are kept
+void onSignal(int signal) {
+  constexpr char kText[] = "\nstopping when the round is over; once more stops at once\n";
+  g_stop = true;
+  std::signal(signal, SIG_DFL);
+  if (::write(STDERR_FILENO, kText, sizeof kText - 1) < 0) return;  // nobody to tell
+}
 
 struct Arguments {
   std::vector<std::string> words;  ///< all that is neither an option nor ROS's own remapping
