@@ -1,6 +1,7 @@
 """What every figure of pMeta shares: colours, style, panels, legends, and the files written."""
 
 import os
+import re
 import textwrap
 
 import matplotlib
@@ -82,9 +83,15 @@ def headline(figure, text):
     figure.suptitle(text.replace("$", "\\$"), x=0.01, ha="left", fontsize=11)
 
 
-def wrapped_name(name, width=30):
+def wrapped_name(name, width=34):
     """A task's name in short lines, which end between two of its properties, not within one."""
-    return textwrap.fill(", ".join(part.replace(" ", "\u00a0") for part in name.split(", ")), width)
+    parts = re.split("(?<=[,:]) ", name)
+    return textwrap.fill(" ".join(part.replace(" ", "\u00a0") for part in parts), width)
+
+
+def row_height(labels, least):
+    """Inches of a row that has one of these labels, of small letters, before it."""
+    return max(least, 0.06 + 0.15 * max(label.count("\n") + 1 for label in labels))
 
 
 def spread_ticks(axis, values):

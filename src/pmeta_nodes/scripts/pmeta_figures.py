@@ -10,7 +10,7 @@ import pmeta_tables as pt
 from pmeta_curves import (MP, PP, RETURN, adaptation_curves, draw_curve, draw_optimum, over_seeds,
                           progress_axis, seeds_text)
 from pmeta_drawing import (BLUE, GREEN, GREY, PALETTE, PURPLE, RED, SKY, folder_for, headline,
-                           legend_right, panels, spread_ticks, wrapped_name)
+                           legend_right, panels, row_height, spread_ticks, wrapped_name)
 from pmeta_files import SNAPSHOTS
 
 BASELINES = {  # algorithm: (the policy it is judged by, label, style)
@@ -207,9 +207,11 @@ def task_figure(experiment, groups, figures, prefix):
     if len(shown) < len(groups):
         pr.warn("tasks_last shows %d of the %d groups of %s; tasks_last.csv has all of them."
                 % (len(shown), len(groups), experiment))
-    tasks = max(group.runs[0].num_tasks for group in shown)
+    names = max((group.runs[0].task_names for group in shown), key=len)
+    labels = [wrapped_name(name) for name in names]
+    tasks = len(labels)
     figure, axes = plt.subplots(len(shown), 2, squeeze=False, sharex=True, sharey=True,
-                                figsize=(10.4, 0.7 + len(shown) * (0.5 + 0.36 * tasks)),
+                                figsize=(10.4, 0.7 + len(shown) * (0.5 + row_height(labels, 0.36) * tasks)),
                                 constrained_layout=True)
     for row, group in zip(axes, shown):
         for axis, snapshot in zip(row, SNAPSHOTS):
@@ -217,9 +219,8 @@ def task_figure(experiment, groups, figures, prefix):
             axis.set_title(textwrap.fill("%s: %s round, %s episodes" % (group.label, snapshot,
                                                                        episodes), 54),
                            loc="left", fontsize=9.5)
-    names = max((group.runs[0].task_names for group in shown), key=len)
     axes[0][0].set_yticks(range(tasks))
-    axes[0][0].set_yticklabels([wrapped_name(name) for name in names])
+    axes[0][0].set_yticklabels(labels)
     axes[0][0].set_ylim(tasks - 0.5, -0.5)
     for axis in axes[-1]:
         axis.set_xlabel("return of the task (reward per episode)")

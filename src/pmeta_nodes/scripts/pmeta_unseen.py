@@ -7,7 +7,7 @@ import numpy as np
 
 import pmeta_runs as pr
 from pmeta_curves import (RETURN, draw_curve, meta_label, meta_style, over_seeds, progress_axis)
-from pmeta_drawing import folder_for, headline, legend_right, wrapped_name
+from pmeta_drawing import folder_for, headline, legend_right, row_height, wrapped_name
 
 MAX_GROUPS = 3
 
@@ -25,10 +25,11 @@ def unseen_tasks(experiment, groups, figures, prefix):
     if len(shown) < len(groups):
         pr.warn("unseen_tasks shows %d of the %d groups of %s."
                 % (len(shown), len(groups), experiment))
-    tasks = max(g.runs[0].num_tasks + g.runs[0].num_tests for g in shown)
+    labels = max((task_labels(group.runs[0]) for group in shown), key=len)
+    tasks_height = row_height(labels, 0.3) * len(labels)
     figure, axes = plt.subplots(len(shown), 2, squeeze=False, constrained_layout=True,
                                 gridspec_kw={"width_ratios": (1.25, 1)},
-                                figsize=(11.4, 0.4 + len(shown) * max(3.3, 0.7 + 0.3 * tasks)))
+                                figsize=(11.4, 0.4 + len(shown) * max(3.3, 0.7 + tasks_height)))
     steps = pr.differ_in_length(shown)
     for (left, right), group in zip(axes, shown):
         for split in ("train", "test"):
@@ -48,6 +49,11 @@ def unseen_tasks(experiment, groups, figures, prefix):
         experiment, over_seeds("mean ± standard deviation", shown),
         "; task by task every seed (small) and the mean (large)" if many else ""))
     figures.save(figure, prefix + experiment + "_unseen_tasks")
+
+
+def task_labels(run):
+    return [wrapped_name(name) for name in
+            list(run.task_names) + ["test: " + name for name in run.test_names]]
 
 
 def label_of(split, count, counts):
@@ -75,8 +81,7 @@ def draw_last_round(axis, group):
     if run.num_tests:
         axis.axhline(run.num_tasks - 0.5, color="#666666", linewidth=0.9)
     axis.set_yticks(range(tasks))
-    axis.set_yticklabels([wrapped_name(name) for name in run.task_names]
-                         + [wrapped_name("test: " + name) for name in run.test_names])
+    axis.set_yticklabels(task_labels(run))
     axis.set_ylim(tasks - 0.5, -0.5)
     axis.grid(False, axis="y")
     axis.tick_params(axis="y", length=0, labelsize=8.5)
