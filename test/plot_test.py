@@ -1,6 +1,7 @@
 """Tests of `pmeta plot`: run folders written here, numbers worked out here from their CSV text."""
 
 import csv
+import json
 import math
 import os
 import re
@@ -586,6 +587,33 @@ def test_unseen_tasks_show_what_the_files_say(tmp_path, adapting):
         assert [round(y) for y in places] == [int(r["task"]) for r in rows[0]]
     assert [text.get_text().replace("\xa0", " ") for text in tasks.get_yticklabels()] == [
         "zeta 3", "zeta 3.5", "test: zeta 4", "test: zeta 4.5", "test: zeta 5"]
+
+
+def test_long_task_names_do_not_touch(tmp_path):
+    names = ["model of task_seed 3436146%d: 26.%d kg (base 23.7), friction of the feet 0.81 and 6.%d"
+             % (i, i, i) for i in range(10, 22)]
+    path = os.path.join(write_run(tmp_path, tests=10), "manifest.json")
+    with open(path) as file:
+        manifest = json.load(file)
+    for task, name in zip(manifest["tasks"], names):
+        task["description"] = name
+    with open(path, "w") as file:
+        json.dump(manifest, file)
+    kept = Kept()
+    pu.draw_unseen(groups_of(tmp_path), kept)
+    pf.task_figure("grid", groups_of(tmp_path)["grid"], kept, "")
+    found = 0
+    for figure, _ in kept.written:
+        figure.canvas.draw()
+        for axis in figure.axes:
+            boxes = [text.get_window_extent() for text in axis.get_yticklabels()
+                     if "kg" in text.get_text()]
+            found += len(boxes)
+            assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    assert found == 12 + 2
+    assert pd.wrapped_name(names[0]).replace("\xa0", " ").split("\n") == [
+        "model of task_seed 343614610:", "26.10 kg (base 23.7),",
+        "friction of the feet 0.81 and 6.10"]
 
 
 def test_unseen_tasks_are_drawn_only_where_there_are_any(tmp_path, adapting):
