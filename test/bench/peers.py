@@ -162,17 +162,17 @@ def compare(name, bench, rounds):
     kernels_text = f"{core_type or 'the dispatched'} kernels"
 
     variants = check_same_work(name)
-    groups = {"with no settings": [({}, OUT_OF_THE_BOX)],
-              kernels_text: [(kernels, variant) for variant in variants],
-              f"{kernels_text}, memory kept": [({**kernels, **KEEP_MEMORY}, variant)
+    # what is measured in each: settings, variant, and its times
+    groups = {"with no settings": [({}, OUT_OF_THE_BOX, [])],
+              kernels_text: [(kernels, variant, []) for variant in variants],
+              f"{kernels_text}, memory kept": [({**kernels, **KEEP_MEMORY}, variant, [])
                                                for variant in variants]}
-    cases = [case for group in groups.values() for case in group]
-    times = [[] for _ in cases]
     pmeta = []
     for _ in range(rounds):
         pmeta.append(pmeta_seconds(name, bench))
-        for found, (settings, variant) in zip(times, cases):
-            found.append(measured(settings, name, variant))
+        for group in groups.values():
+            for settings, variant, found in group:
+                found.append(measured(settings, name, variant))
 
     # of all rounds, the best percentile and the median of the medians
     def over_rounds(found):
@@ -186,16 +186,14 @@ def compare(name, bench, rounds):
         ms, median = over_rounds(found)
         print(f"{label:44} {ms:6.2f} {median:7.2f} {pmeta_ms:9.2f} {ms / pmeta_ms:6.2f}")
 
-    remaining = iter(times)
-    for title, group in groups.items():
-        print(f"PyTorch, {title}:")
-        found = [(variant, next(remaining)) for _, variant in group]
-        for variant, its_times in found:
-            row("  " + variant, its_times)
-        if len(found) > 1:
-            with_autograd = [t for variant, t in found if "by hand" not in variant]
+    for settings_text, group in groups.items():
+        print(f"PyTorch, {settings_text}:")
+        for _, variant, found in group:
+            row("  " + variant, found)
+        if len(group) > 1:
+            with_autograd = [found for _, variant, found in group if "by hand" not in variant]
             row("  the best of these with autograd", min(with_autograd, key=over_rounds))
-            row("  the best of these", min((t for _, t in found), key=over_rounds))
+            row("  the best of these", min((found for *_, found in group), key=over_rounds))
     print(f"{'pMeta':44} {pmeta_ms:6.2f} {pmeta_median:7.2f} {pmeta_ms:9.2f} {1:6.2f}", flush=True)
 
 

@@ -162,8 +162,8 @@ EpisodeValues episodeValues(const Recording& recording) {
   return EpisodeValues(allOf<pmeta_msgs::Trajectory>(recording.ofPublic()));
 }
 
-/// The message without its float32 parameters and with its times set to zero: they differ from run to run, and any four bytes that do
-/// will one day be those of some number.
+/// The message without its float32 parameters and with its times set to zero: they differ from run
+/// to run, and any four bytes that do will one day be those of some number.
 std::vector<std::uint8_t> searchedWhole(const RecordedMessage& message) {
   if (message.type == "pmeta_msgs/MetaPolicy") {
     auto msg = message.as<pmeta_msgs::MetaPolicy>();

@@ -25,8 +25,8 @@ struct ContextSettings {
   /// The other episodes, which act on z from q(z|c), are context as well (PEARL's, where the reward
   /// is sparse): else hardly any context would show a reward.
   bool posterior_episodes = false;
-  /// Whose actor acts on z from the prior: "meta" (the meta-policy's of the round, which also explores
-  /// at test time) or "personal".
+  /// Whose actor acts on z from the prior: "meta" (the meta-policy's of the round, which also
+  /// explores at test time) or "personal".
   std::string explorer = "meta";
   /// The meta-policy is evaluated before it has explored the task, and after so many episodes of
   /// exploration; ascending.

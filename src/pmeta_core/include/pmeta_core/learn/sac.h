@@ -53,8 +53,9 @@ class SacLearner {
 
   /// env_steps_per_update steps by samples of the policy, kept in the replay; the first call also
   /// starts the environment and warms it up. With an encoder, z is drawn anew for each episode:
-  /// from the prior in every prior_interval-th, whose transitions become context, else from q(z|c).
-  /// There `explorer` acts instead, if not null: another actor's parameters.
+  /// from the prior in every prior_interval-th, else from q(z|c). On z from the prior `explorer`
+  /// acts, if not null: another actor's parameters. Those transitions become context, and with
+  /// posterior_episodes all do.
   /// Returns the transitions made. Allocates nothing once the buffers are full.
   std::int64_t collect(const float* parameters, Rng& rng, const float* explorer = nullptr);
 
