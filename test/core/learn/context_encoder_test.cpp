@@ -212,6 +212,19 @@ TEST(ContextEncoder, RowsHoldWhatTheSettingsSay) {
   }
 }
 
+TEST(ContextEncoder, RowsAreCompressedWhereAskedFor) {
+  ContextSettings settings = smallSettings();
+  settings.next_observation = settings.symlog = true;
+  const float s[] = {50, -0.5f}, a[] = {0}, next[] = {-50, 1};
+  const ContextEncoder encoder(2, 1, settings);
+  std::vector<float> row(encoder.rowSize());
+  encoder.writeRow({s, a, -6, 0.9f, next}, row.data());
+  const double expected[] = {std::log(51), -std::log(1.5), 0,
+                             -std::log(7), -std::log(51),  std::log(2)};
+  ASSERT_EQ(row.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(row[i], expected[i], 1e-6) << i;
+}
+
 TEST(ContextEncoder, RefusesAGradientOfMoreThanItHolds) {
   Encoding e(smallSettings(), 12, 5);
   e.infer(12);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <vector>
 
 #include "../allocations.h"
@@ -159,13 +160,10 @@ class Reference {
         settings_(learner.settings()),
         alpha_(learner.temperature().value()),
         targets_(learner.targets().begin(), learner.targets().end()) {
-    if (networks_.hasEncoder()) {
-      for (int i = 0; i < settings_.context.batch_size; ++i) {
-        const Transition t = learner.context()[rng.below(learner.context().size())];
-        rows_.push_back(concatenated({Vector(t.observation, t.observation + 3),
-                                      Vector(t.action, t.action + 2), Vector{t.reward}}));
-      }
-      for (std::size_t j = 0; j < 3; ++j) latent_noise_.push_back(rng.normal());
+    for (int k = 0; networks_.hasEncoder() && k < settings_.context.per_update; ++k) {
+      rows_.push_back(context(rng));
+      latent_noise_.emplace_back();
+      for (std::size_t j = 0; j < 3; ++j) latent_noise_.back().push_back(rng.normal());
     }
     for (int b = 0; b < settings_.batch_size; ++b) {
       const Transition t = learner.replay()[rng.below(learner.replay().size())];
@@ -181,20 +179,31 @@ class Reference {
     }
   }
 
-  // x by the parameters p: fixed, or z by its encoder
-  Vector input(const Vector& p) const {
-    if (!networks_.hasEncoder()) {
-      return Vector(learner_.taskInput().begin(), learner_.taskInput().end());
+  // x of every sample by the parameters p: fixed, or by its encoder the z of the sample's context
+  std::vector<Vector> inputs(const Vector& p) const {
+    const Vector fixed(learner_.taskInput().begin(), learner_.taskInput().end());
+    std::vector<Vector> x(s_.size(), fixed);
+    if (!networks_.hasEncoder()) return x;
+    for (std::size_t b = 0; b < s_.size(); ++b) {
+      const std::size_t k = b * rows_.size() / s_.size();
+      const LatentPosterior q = posterior(p, k);
+      for (std::size_t j = 0; j < 3; ++j) {
+        x[b][j] = q.mean[j] + std::sqrt(q.variance[j]) * latent_noise_[k][j];
+      }
     }
-    const LatentPosterior q = posterior(p);
-    Vector z(q.mean);
-    for (std::size_t j = 0; j < z.size(); ++j) z[j] += std::sqrt(q.variance[j]) * latent_noise_[j];
-    return z;
+    return x;
   }
 
-  LatentPosterior posterior(const Vector& p) const {
+  // mean over the contexts
+  double kl(const Vector& p) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < rows_.size(); ++k) sum += klToPrior(posterior(p, k));
+    return sum / static_cast<double>(rows_.size());
+  }
+
+  LatentPosterior posterior(const Vector& p, std::size_t context) const {
     LatentPosterior q{Vector(3, 0.0), Vector(3, 0.0)};
-    for (const Vector& row : rows_) {
+    for (const Vector& row : rows_[context]) {
       const Vector heads =
           outputs(networks_.encoder().network(), p.data() + networks_.encoderOffset(), row);
       for (std::size_t j = 0; j < 3; ++j) {
@@ -230,13 +239,13 @@ class Reference {
 
   // y of every sample: terminal by what the environment says, never by its horizon
   Vector y(const Vector& p) const {
-    const Vector x = input(p);
+    const std::vector<Vector> x = inputs(p);
     Vector result;
     for (std::size_t b = 0; b < s_.size(); ++b) {
       double log_prob = 0;
-      const Vector a = action(p, next_[b], x, s_.size() + b, log_prob);
-      const double q1 = q(0, targets_.data(), next_[b], x, a);
-      const double q2 = q(1, targets_.data() + networks_.critic(0).size(), next_[b], x, a);
+      const Vector a = action(p, next_[b], x[b], s_.size() + b, log_prob);
+      const double q1 = q(0, targets_.data(), next_[b], x[b], a);
+      const double q2 = q(1, targets_.data() + networks_.critic(0).size(), next_[b], x[b], a);
       const bool terminal = std::abs(next_[b][0]) > 2.5;
       result.push_back(1.5 * rewards_[b] +
                        (terminal ? 0 : 0.9) * (std::min(q1, q2) - alpha_ * log_prob));
@@ -244,23 +253,24 @@ class Reference {
     return result;
   }
 
-  double criticLoss(int k, const Vector& p, const Vector& x, const Vector& y) const {
+  double criticLoss(int k, const Vector& p, const std::vector<Vector>& x, const Vector& y) const {
     double sum = 0;
     for (std::size_t b = 0; b < y.size(); ++b) {
-      const double e = q(k, p.data() + networks_.criticOffset(k), s_[b], x, a_[b]) - y[b];
+      const double e = q(k, p.data() + networks_.criticOffset(k), s_[b], x[b], a_[b]) - y[b];
       sum += e * e;
     }
     return sum / static_cast<double>(y.size());
   }
 
   // with the critics of p as well
-  double actorLoss(const Vector& p, const Vector& x, double* mean_log_prob = nullptr) const {
+  double actorLoss(const Vector& p, const std::vector<Vector>& x,
+                   double* mean_log_prob = nullptr) const {
     double sum = 0, log_probs = 0;
     for (std::size_t b = 0; b < s_.size(); ++b) {
       double log_prob = 0;
-      const Vector a = action(p, s_[b], x, b, log_prob);
-      const double q1 = q(0, p.data() + networks_.criticOffset(0), s_[b], x, a);
-      const double q2 = q(1, p.data() + networks_.criticOffset(1), s_[b], x, a);
+      const Vector a = action(p, s_[b], x[b], b, log_prob);
+      const double q1 = q(0, p.data() + networks_.criticOffset(0), s_[b], x[b], a);
+      const double q2 = q(1, p.data() + networks_.criticOffset(1), s_[b], x[b], a);
       sum += alpha_ * log_prob - std::min(q1, q2);
       log_probs += log_prob;
     }
@@ -270,13 +280,37 @@ class Reference {
   }
 
  private:
+  // the rows of one context: of a window from the oldest kept transition on, or of all
+  std::vector<Vector> context(Rng& rng) const {
+    const ReplayBuffer& kept = learner_.context();
+    std::vector<std::size_t> slots(kept.size());
+    std::iota(slots.begin(), slots.end(), 0);
+    const auto window = static_cast<std::size_t>(settings_.context.window);
+    if (window > 0) {
+      std::rotate(slots.begin(),
+                  slots.begin() + static_cast<std::ptrdiff_t>(kept.next() % kept.size()),
+                  slots.end());
+      slots.erase(slots.begin(),
+                  slots.begin() + static_cast<std::ptrdiff_t>(rng.below(kept.size() - window + 1)));
+      slots.resize(window);
+    }
+    std::vector<Vector> rows;
+    for (int i = 0; i < settings_.context.batch_size; ++i) {
+      const Transition t = kept[slots[rng.below(slots.size())]];
+      rows.push_back(concatenated({Vector(t.observation, t.observation + 3),
+                                   Vector(t.action, t.action + 2), Vector{t.reward}}));
+    }
+    return rows;
+  }
+
   const SacLearner& learner_;
   const SacNetworks& networks_;
   SacSettings settings_;
   double alpha_;
   Vector targets_;
-  std::vector<Vector> rows_, s_, a_, next_, noise_;
-  Vector latent_noise_, rewards_;
+  std::vector<std::vector<Vector>> rows_;  // of each context
+  std::vector<Vector> latent_noise_, s_, a_, next_, noise_;
+  Vector rewards_;
 };
 
 void expectGradient(const std::vector<float>& gradient, std::size_t offset, std::size_t n, Vector p,
@@ -300,7 +334,13 @@ void expectGradient(const std::vector<float>& gradient, std::size_t offset, std:
 class SacGradients : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(SacGradients, AreTheLossesByFiniteDifferences) {
-  Trainer trainer(smallSettings(GetParam()));
+  const bool windows = GetParam() == std::string("inference_by_windows");
+  SacSettings settings = smallSettings(windows ? "inference" : GetParam());
+  if (windows) {
+    settings.context.window = 12;
+    settings.context.per_update = 3;
+  }
+  Trainer trainer(settings);
   const SacNetworks& networks = trainer.learner.networks();
   for (int i = 0; i < 30; ++i) trainer.update();  // targets that differ from the critics
   for (int i = 0; i < 3; ++i) {
@@ -311,7 +351,8 @@ TEST_P(SacGradients, AreTheLossesByFiniteDifferences) {
         trainer.learner.update(trainer.parameters.data(), trainer.optimizer, trainer.rng);
     const std::vector<float>& gradient = trainer.optimizer.gradient;
 
-    const Vector y = reference.y(before), x = reference.input(before);
+    const Vector y = reference.y(before);
+    const std::vector<Vector> x = reference.inputs(before);
     double critic_loss = 0;
     for (int k = 0; k < 2; ++k) {
       critic_loss += 0.5 * reference.criticLoss(k, before, x, y);
@@ -323,11 +364,11 @@ TEST_P(SacGradients, AreTheLossesByFiniteDifferences) {
     if (networks.hasEncoder()) {
       expectGradient(gradient, networks.encoderOffset(), networks.encoder().network().size(),
                      before, [&](const Vector& p) {
-                       const Vector z = reference.input(p);
+                       const std::vector<Vector> z = reference.inputs(p);
                        return reference.criticLoss(0, p, z, y) + reference.criticLoss(1, p, z, y) +
-                              0.1 * klToPrior(reference.posterior(p));
+                              0.1 * reference.kl(p);
                      });
-      EXPECT_NEAR(losses.kl, klToPrior(reference.posterior(before)), 1e-4 * losses.kl);
+      EXPECT_NEAR(losses.kl, reference.kl(before), 1e-4 * losses.kl);
     }
 
     // the actor's step sees the critics that have moved
@@ -341,7 +382,8 @@ TEST_P(SacGradients, AreTheLossesByFiniteDifferences) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Encodings, SacGradients, ::testing::Values("none", "one_hot", "inference"),
+INSTANTIATE_TEST_SUITE_P(Encodings, SacGradients,
+                         ::testing::Values("none", "one_hot", "inference", "inference_by_windows"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Sac, CriticsThenEncoderThenActorMoveAndTargetsFollowTheCritics) {
@@ -465,6 +507,16 @@ TEST(Sac, PosteriorEpisodesAreContextWhereAskedFor) {
     ASSERT_EQ(context[k].observation[0], replay[k].observation[0]) << k;
     EXPECT_EQ(context[k].reward, replay[k].action[0]) << "the sparse reward";
   }
+}
+
+TEST(Sac, RefusesMoreContextsThanTheBatchHasRows) {
+  SacSettings settings = smallSettings("inference");
+  settings.context.per_update = settings.batch_size + 1;
+  EXPECT_EQ(test::errorOf([&] { Trainer trainer(settings); }),
+            "soft actor-critic cannot share a batch of 16 transitions among 17 contexts: "
+            "contexts_per_update is at most batch_size.");
+  settings.task_encoding = "none";
+  EXPECT_NO_THROW(Trainer trainer(settings));
 }
 
 TEST(Sac, TheExplorerActsInPriorEpisodesOnly) {

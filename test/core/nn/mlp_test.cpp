@@ -235,21 +235,24 @@ TEST(Mlp, BackwardOfTheFirstRowsIsThatOfASmallerBatch) {
   for (std::size_t k = 0; k < a.size(); ++k) ASSERT_NEAR(a[k], b[k], 1e-5);
 }
 
-TEST(Mlp, SharedInputGradientIsTheSumOverRows) {
+TEST(Mlp, BackwardBySomeInputsIsThatPartOfAll) {
   for (const std::vector<std::size_t>& hidden : {std::vector<std::size_t>{24, 17}, {}}) {
     const Mlp mlp({"q", 5, hidden, 2});
     const auto parameters = initialised(mlp, 1), input = noise(30 * 5, 2), d_y = noise(30 * 2, 3);
     MlpWorkspace workspace(mlp, 30);
     mlp.forward(parameters.data(), input.data(), 30, workspace);
-    std::vector<float> gradient(mlp.size()), d_input(30 * 5), shared = {10, 20, 30};
-    mlp.backward(parameters.data(), input.data(), 30, d_y.data(), gradient.data(), d_input.data(),
+    std::vector<float> gradient(mlp.size()), same(mlp.size()), all(30 * 5), some(30 * 3);
+    mlp.backward(parameters.data(), input.data(), 30, d_y.data(), gradient.data(), all.data(),
                  workspace);
-    mlp.addSharedInputGradient(parameters.data(), gradient.data(), 1, 3, shared.data());
-    for (std::size_t i = 0; i < 3; ++i) {
-      double sum = 10 * (static_cast<double>(i) + 1);
-      for (std::size_t b = 0; b < 30; ++b) sum += d_input[5 * b + 1 + i];
-      EXPECT_NEAR(shared[i], sum, 2e-5);
+    mlp.backward(parameters.data(), input.data(), 30, d_y.data(), same.data(), 1, 3, some.data(),
+                 workspace);
+    EXPECT_EQ(same, gradient);
+    for (std::size_t b = 0; b < 30; ++b) {
+      for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(some[3 * b + i], all[5 * b + 1 + i], 1e-6);
     }
+    EXPECT_THROW(mlp.backward(parameters.data(), input.data(), 30, d_y.data(), same.data(), 3, 3,
+                              some.data(), workspace),
+                 Error);
   }
 }
 

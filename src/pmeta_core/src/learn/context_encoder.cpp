@@ -36,6 +36,15 @@ void bind(Settings& s, const std::string& prefix, ContextSettings& c) {
          "context transitions of one update, and of one z to act with", Range::between(1, 1e6));
   s.bind(prefix + "context_buffer", c.buffer_size, "recent context transitions kept",
          Range::between(1, 1e9));
+  s.bind(prefix + "context_window", c.window,
+         "transitions in a row that one training context is drawn from, such as an episode's; 0: "
+         "all that are kept",
+         Range::between(0, 1e9));
+  s.bind(prefix + "contexts_per_update", c.per_update,
+         "contexts of one update, each giving its z to an equal part of the batch",
+         Range::between(1, 1e6));
+  s.bind(prefix + "context_symlog", c.symlog,
+         "the encoder sees sign(x) ln(1 + |x|) of every number in a context");
   s.bind(prefix + "kl_weight", c.kl_weight, "weight of the divergence of q(z|c) from the prior",
          Range::atLeast(0));
   s.bind(prefix + "context_next_observation", c.next_observation,
@@ -75,16 +84,19 @@ ContextEncoder::ContextEncoder(int observation_size, int action_size,
     : observation_size_(observation_size),
       action_size_(action_size),
       next_observation_(settings.next_observation),
+      symlog_(settings.symlog),
       latent_size_(static_cast<std::size_t>(settings.latent_size)),
       network_(encoderNetwork(static_cast<std::size_t>(
                                   observation_size * (next_observation_ ? 2 : 1) + action_size + 1),
                               settings)) {}
 
 void ContextEncoder::writeRow(const Transition& transition, float* row) const {
-  row = std::copy_n(transition.observation, observation_size_, row);
-  row = std::copy_n(transition.action, action_size_, row);
-  *row++ = transition.reward;
-  if (next_observation_) std::copy_n(transition.next_observation, observation_size_, row);
+  float* end = std::copy_n(transition.observation, observation_size_, row);
+  end = std::copy_n(transition.action, action_size_, end);
+  *end++ = transition.reward;
+  if (next_observation_) end = std::copy_n(transition.next_observation, observation_size_, end);
+  if (!symlog_) return;
+  for (; row < end; ++row) *row = std::copysign(std::log1p(std::abs(*row)), *row);
 }
 
 void ContextEncoder::infer(const float* parameters, const float* context, std::size_t rows,

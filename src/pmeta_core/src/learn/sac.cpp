@@ -24,6 +24,16 @@ std::size_t contextCapacity(const SacSettings& settings) {
   return used ? static_cast<std::size_t>(settings.context.buffer_size) : 1;
 }
 
+std::size_t requireContexts(const SacSettings& settings) {
+  if (settings.task_encoding != "inference") return 1;
+  if (settings.context.per_update > settings.batch_size) {
+    throw Error("soft actor-critic cannot share a batch of " + std::to_string(settings.batch_size) +
+                " transitions among " + std::to_string(settings.context.per_update) +
+                " contexts: contexts_per_update is at most batch_size.");
+  }
+  return static_cast<std::size_t>(settings.context.per_update);
+}
+
 }  // namespace
 
 SacLearner::SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
@@ -32,6 +42,7 @@ SacLearner::SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
       settings_(settings),
       networks_(env_->spec(), settings, static_cast<int>(task_input.size())),
       batch_(static_cast<std::size_t>(settings.batch_size)),
+      contexts_(requireContexts(settings)),
       observation_size_(networks_.observationSize()),
       action_size_(networks_.actionSize()),
       task_input_(requireTaskInput(std::move(task_input), settings)),
@@ -68,16 +79,21 @@ SacLearner::SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
   if (networks_.hasEncoder()) {
     const ContextEncoder& encoder = networks_.encoder();
     const auto rows = static_cast<std::size_t>(settings.context.batch_size);
-    encoder_workspace_.emplace(encoder, rows);
-    context_rows_.resize(rows * encoder.rowSize());
-    posterior_.mean.resize(encoder.latentSize());
-    posterior_.variance.resize(encoder.latentSize());
-    latent_noise_.resize(encoder.latentSize());
-    d_latent_.resize(encoder.latentSize());
-    task_input_.resize(encoder.latentSize());
+    const std::size_t latent = encoder.latentSize();
+    const std::vector<double> zeros(latent);
+    for (std::size_t k = 0; k < contexts_; ++k) {
+      drawn_.push_back({AlignedFloats(rows * encoder.rowSize()),
+                        ContextEncoder::Workspace(encoder, rows),
+                        {zeros, zeros},
+                        zeros,
+                        std::vector<float>(latent)});
+    }
+    d_latent_rows_.resize(batch_ * latent);
+    encoder_gradient_.resize(encoder.network().size());
+    task_input_.resize(latent);
     gradient_.resize(std::max(gradient_.size(), encoder.network().size()));
   }
-  update_input_ = task_input_;
+  update_inputs_.assign(contexts_, task_input_);
 }
 
 void SacLearner::resetTargets(const float* parameters) {
@@ -108,8 +124,8 @@ void SacLearner::beginEpisode(const float* parameters, bool warm_up, Rng& rng) {
     for (float& z : task_input_) z = static_cast<float>(rng.normal());
     return;
   }
-  drawTask(parameters, rng);
-  task_input_ = update_input_;
+  drawTask(0, parameters, rng);
+  task_input_ = update_inputs_[0];
 }
 
 void SacLearner::step(const float* parameters, const float* explorer, bool warm_up, Rng& rng) {
@@ -137,34 +153,42 @@ void SacLearner::step(const float* parameters, const float* explorer, bool warm_
   if (step.terminated || step.truncated) beginEpisode(parameters, warm_up, rng);
 }
 
-void SacLearner::sampleContext(Rng& rng) {
-  const std::size_t size = networks_.encoder().rowSize();
-  for (std::size_t i = 0; i < context_rows_.size(); i += size) {
-    networks_.encoder().writeRow(context_[rng.below(context_.size())], &context_rows_[i]);
+void SacLearner::sampleContext(float* rows, Rng& rng) {
+  const std::size_t kept = context_.size();
+  std::size_t window = kept, first = 0;
+  if (settings_.context.window > 0 && static_cast<std::size_t>(settings_.context.window) < kept) {
+    window = static_cast<std::size_t>(settings_.context.window);
+    const std::size_t oldest = kept < context_.capacity() ? 0 : context_.next();
+    first = oldest + rng.below(kept - window + 1);
+  }
+  for (int i = 0; i < settings_.context.batch_size; ++i, rows += networks_.encoder().rowSize()) {
+    networks_.encoder().writeRow(context_[(first + rng.below(window)) % kept], rows);
   }
 }
 
-void SacLearner::drawTask(const float* parameters, Rng& rng) {
+void SacLearner::drawTask(std::size_t context, const float* parameters, Rng& rng) {
   const ContextEncoder& encoder = networks_.encoder();
-  sampleContext(rng);
-  encoder.infer(parameters + networks_.encoderOffset(), context_rows_.data(),
-                context_rows_.size() / encoder.rowSize(), *encoder_workspace_, posterior_);
-  for (std::size_t j = 0; j < latent_noise_.size(); ++j) {
-    latent_noise_[j] = rng.normal();
-    update_input_[j] = static_cast<float>(posterior_.mean[j] +
-                                          std::sqrt(posterior_.variance[j]) * latent_noise_[j]);
+  DrawnTask& drawn = drawn_[context];
+  sampleContext(drawn.rows.data(), rng);
+  encoder.infer(parameters + networks_.encoderOffset(), drawn.rows.data(),
+                drawn.rows.size() / encoder.rowSize(), drawn.workspace, drawn.posterior);
+  for (std::size_t j = 0; j < drawn.noise.size(); ++j) {
+    drawn.noise[j] = rng.normal();
+    update_inputs_[context][j] = static_cast<float>(
+        drawn.posterior.mean[j] + std::sqrt(drawn.posterior.variance[j]) * drawn.noise[j]);
   }
 }
 
 // inputs of all networks; the next actions are not known yet
 void SacLearner::sampleBatch(Rng& rng) {
   const std::size_t actor_row = networks_.actor().inputs();
-  const auto write = [&](const float* observation, float* actor, float* critic) {
-    std::copy_n(observation, observation_size_, actor);
-    std::copy(update_input_.begin(), update_input_.end(), actor + observation_size_);
-    return std::copy_n(actor, actor_row, critic);
-  };
   for (std::size_t b = 0; b < batch_; ++b) {
+    const std::vector<float>& x = update_inputs_[contextOf(b)];
+    const auto write = [&](const float* observation, float* actor, float* critic) {
+      std::copy_n(observation, observation_size_, actor);
+      std::copy(x.begin(), x.end(), actor + observation_size_);
+      return std::copy_n(actor, actor_row, critic);
+    };
     const Transition t = replay_[rng.below(replay_.size())];
     const std::size_t critic_row = b * networks_.critic(0).inputs();
     float* action = write(t.observation, &actor_input_[b * actor_row], &critic_input_[critic_row]);
@@ -178,9 +202,9 @@ void SacLearner::sampleBatch(Rng& rng) {
 
 SacLosses SacLearner::update(const float* parameters, Optimizer<float>& optimizer, Rng& rng) {
   if (replay_.size() == 0) throw Error("call collect() before soft actor-critic's update().");
-  if (networks_.hasEncoder()) {
-    drawTask(parameters, rng);
-    std::fill(d_latent_.begin(), d_latent_.end(), 0.0f);
+  for (std::size_t k = 0; k < drawn_.size(); ++k) {
+    drawTask(k, parameters, rng);
+    std::fill(drawn_[k].d_latent.begin(), drawn_[k].d_latent.end(), 0.0f);
   }
   sampleBatch(rng);
   // one pass for the actions in s' and in s: the actor does not move before its own step
@@ -191,10 +215,7 @@ SacLosses SacLearner::update(const float* parameters, Optimizer<float>& optimize
 
   SacLosses losses;
   for (int k = 0; k < 2; ++k) losses.critic += 0.5 * updateCritic(k, parameters, optimizer);
-  if (networks_.hasEncoder()) {
-    losses.kl = klToPrior(posterior_);
-    updateEncoder(parameters, optimizer);
-  }
+  if (networks_.hasEncoder()) losses.kl = updateEncoder(parameters, optimizer);
   losses.actor = updateActor(parameters, optimizer);
 
   double mean_log_prob = 0;
@@ -235,25 +256,35 @@ double SacLearner::updateCritic(int k, const float* parameters, Optimizer<float>
   const float* q = critic.forward(theta, critic_input_.data(), batch_, workspace);
   for (std::size_t b = 0; b < batch_; ++b) errors_[b] = q[b] - y_[b];
   const double loss = kernels().squaredLoss(errors_.data(), nullptr, d_q_.data(), batch_);
-  critic.backward(theta, critic_input_.data(), batch_, d_q_.data(), gradient_.data(), nullptr,
+  const std::size_t latent = d_latent_rows_.size() / batch_;  // 0 without an encoder
+  critic.backward(theta, critic_input_.data(), batch_, d_q_.data(), gradient_.data(),
+                  observation_size_, latent, latent == 0 ? nullptr : d_latent_rows_.data(),
                   workspace);
-  // every row has the same z
-  if (networks_.hasEncoder()) {
-    critic.addSharedInputGradient(theta, gradient_.data(), observation_size_, d_latent_.size(),
-                                  d_latent_.data());
+  for (std::size_t b = 0; b < batch_ && latent > 0; ++b) {
+    float* d_latent = drawn_[contextOf(b)].d_latent.data();
+    for (std::size_t j = 0; j < latent; ++j) d_latent[j] += d_latent_rows_[b * latent + j];
   }
   optimizer.apply(networks_.criticOffset(k), gradient_.data(), critic.size(), target(k),
                   settings_.tau);
   return loss;
 }
 
-void SacLearner::updateEncoder(const float* parameters, Optimizer<float>& optimizer) {
+double SacLearner::updateEncoder(const float* parameters, Optimizer<float>& optimizer) {
   const ContextEncoder& encoder = networks_.encoder();
-  encoder.backward(parameters + networks_.encoderOffset(), context_rows_.data(),
-                   context_rows_.size() / encoder.rowSize(), posterior_, latent_noise_.data(),
-                   d_latent_.data(), settings_.context.kl_weight, *encoder_workspace_,
-                   gradient_.data());
-  optimizer.apply(networks_.encoderOffset(), gradient_.data(), encoder.network().size());
+  const std::size_t size = encoder.network().size();
+  const auto n = static_cast<double>(contexts_);
+  double kl = 0;
+  std::fill_n(gradient_.begin(), size, 0.0f);
+  for (DrawnTask& drawn : drawn_) {
+    kl += klToPrior(drawn.posterior) / n;
+    encoder.backward(parameters + networks_.encoderOffset(), drawn.rows.data(),
+                     drawn.rows.size() / encoder.rowSize(), drawn.posterior, drawn.noise.data(),
+                     drawn.d_latent.data(), settings_.context.kl_weight / n, drawn.workspace,
+                     encoder_gradient_.data());
+    for (std::size_t k = 0; k < size; ++k) gradient_[k] += encoder_gradient_[k];
+  }
+  optimizer.apply(networks_.encoderOffset(), gradient_.data(), size);
+  return kl;
 }
 
 double SacLearner::updateActor(const float* parameters, Optimizer<float>& optimizer) {

@@ -124,7 +124,14 @@ const float* Mlp::forward(const float* parameters, const float* input, std::size
 void Mlp::backward(const float* parameters, const float* input, std::size_t batch,
                    const float* d_output, float* gradient, float* d_input,
                    MlpWorkspace& workspace) const {
-  backwardThrough(parameters, input, batch, d_output, gradient, 0, spec_.inputs, nullptr, d_input,
+  backward(parameters, input, batch, d_output, gradient, 0, spec_.inputs, d_input, workspace);
+}
+
+void Mlp::backward(const float* parameters, const float* input, std::size_t batch,
+                   const float* d_output, float* gradient, std::size_t first, std::size_t count,
+                   float* d_input, MlpWorkspace& workspace) const {
+  requireInputs(first, count);
+  backwardThrough(parameters, input, batch, d_output, gradient, first, count, nullptr, d_input,
                   workspace);
 }
 
@@ -141,16 +148,6 @@ void Mlp::backwardInput(const float* parameters, std::size_t batch, const float*
   requireInputs(first, count);
   backwardThrough(parameters, nullptr, batch, d_output, nullptr, first, count, rows, d_input,
                   workspace);
-}
-
-void Mlp::addSharedInputGradient(const float* parameters, const float* gradient, std::size_t first,
-                                 std::size_t count, float* d_input) const {
-  requireInputs(first, count);
-  const Layer& layer = layers_.front();
-  const float* weight = parameters + layer.weight + first;
-  for (std::size_t o = 0; o < layer.outputs; ++o, weight += layer.inputs) {
-    for (std::size_t i = 0; i < count; ++i) d_input[i] += gradient[layer.bias + o] * weight[i];
-  }
 }
 
 void Mlp::backwardThrough(const float* parameters, const float* input, std::size_t batch,

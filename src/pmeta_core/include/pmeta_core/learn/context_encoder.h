@@ -15,8 +15,13 @@ namespace pmeta {
 struct ContextSettings {
   std::vector<int> hidden = {200, 200, 200};  ///< units of each hidden layer of the encoder
   int latent_size = 5;                        ///< length of z
-  int batch_size = 100;           ///< context transitions of one update, and of one z to act with
-  int buffer_size = 1000;         ///< recent context transitions kept
+  int batch_size = 100;    ///< context transitions of one update, and of one z to act with
+  int buffer_size = 1000;  ///< recent context transitions kept
+  /// In training a context's rows come from so many transitions in a row, as they do at test time,
+  /// where all of them may be of one wrong guess; 0: from all that are kept, the sure among them.
+  int window = 0;
+  int per_update = 1;   ///< contexts of one update, each giving its z to an equal part of the batch
+  bool symlog = false;  ///< context rows hold sign(x) ln(1 + |x|) (Hafner et al., 2023) for each x
   double kl_weight = 0.1;         ///< weight of KL(q(z|c) || N(0, I))
   bool next_observation = false;  ///< part of a context row; for tasks that differ in dynamics
   /// While training, every how-many-th episode acts on z from the prior. These, and the random
@@ -91,6 +96,7 @@ class ContextEncoder {
   int observation_size_;
   int action_size_;
   bool next_observation_;
+  bool symlog_;
   std::size_t latent_size_;
   Mlp network_;
 };

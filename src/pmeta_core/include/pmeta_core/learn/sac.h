@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "pmeta_core/env/env.h"
@@ -38,7 +37,8 @@ struct SacLosses {
 ///     encoder:    the sum of both critics' losses by z + kl_weight * KL(q(z|c) || N(0, I))
 ///     actor:      mean over the batch of alpha log pi(a) - min_k Q_k(s, x, a), z fixed
 ///
-/// discount is gamma, 0 after a terminal state; the horizon is none. One z serves an update.
+/// discount is gamma, 0 after a terminal state; the horizon is none. Each context of an update
+/// gives its z to an equal part of the batch.
 class SacLearner {
  public:
   /// `task_input`: the one-hot vector with task_encoding "one_hot", else empty. Throws Error where
@@ -84,20 +84,21 @@ class SacLearner {
  private:
   void beginEpisode(const float* parameters, bool warm_up, Rng& rng);
   void step(const float* parameters, const float* explorer, bool warm_up, Rng& rng);
-  void sampleContext(Rng& rng);
+  void sampleContext(float* rows, Rng& rng);
   void sampleBatch(Rng& rng);
-  void drawTask(const float* parameters, Rng& rng);
+  void drawTask(std::size_t context, const float* parameters, Rng& rng);
   void computeTargets();
   double updateCritic(int k, const float* parameters, Optimizer<float>& optimizer);
-  void updateEncoder(const float* parameters, Optimizer<float>& optimizer);
+  double updateEncoder(const float* parameters, Optimizer<float>& optimizer);
   double updateActor(const float* parameters, Optimizer<float>& optimizer);
   void actionGradient(int k, const float* parameters);
+  std::size_t contextOf(std::size_t row) const { return row * contexts_ / batch_; }
   float* target(int k) { return targets_.data() + (k == 0 ? 0 : networks_.critic(0).size()); }
 
   std::unique_ptr<Env> env_;
   SacSettings settings_;
   SacNetworks networks_;
-  std::size_t batch_, observation_size_, action_size_;
+  std::size_t batch_, contexts_, observation_size_, action_size_;
   std::vector<float> task_input_;
   Temperature temperature_;
   ReplayBuffer replay_, context_;
@@ -123,13 +124,20 @@ class SacLearner {
   std::vector<float> rewards_, discounts_, y_, errors_, d_q_;
   std::vector<std::size_t> minimum_rows_[2];  // where critic 1 or 2 is the smaller one
   AlignedFloats d_action_rows_, d_action_, d_heads_;
-  AlignedFloats gradient_;           // of one network at a time
-  std::vector<float> update_input_;  // x of this update
-  std::optional<ContextEncoder::Workspace> encoder_workspace_;
-  AlignedFloats context_rows_;
-  LatentPosterior posterior_;
-  std::vector<double> latent_noise_;
-  std::vector<float> d_latent_;
+  AlignedFloats gradient_;  // of one network at a time
+
+  // one context of an update and the z drawn from its posterior
+  struct DrawnTask {
+    AlignedFloats rows;
+    ContextEncoder::Workspace workspace;
+    LatentPosterior posterior;
+    std::vector<double> noise;
+    std::vector<float> d_latent;
+  };
+  std::vector<DrawnTask> drawn_;                   // empty without an encoder
+  std::vector<std::vector<float>> update_inputs_;  // x of each; the task input without an encoder
+  AlignedFloats d_latent_rows_;                    // batch x latent
+  AlignedFloats encoder_gradient_;                 // of one context
 };
 
 }  // namespace pmeta

@@ -77,18 +77,18 @@ class Mlp {
                 const float* d_output, float* gradient, float* d_input,
                 MlpWorkspace& workspace) const;
 
+  /// The same, with the gradient by the inputs [first, first + count) alone, into `d_input` [batch,
+  /// count].
+  void backward(const float* parameters, const float* input, std::size_t batch,
+                const float* d_output, float* gradient, std::size_t first, std::size_t count,
+                float* d_input, MlpWorkspace& workspace) const;
+
   /// Gradient by the inputs [first, first + count) alone, into `d_input` [batch, count], with the
   /// parameters frozen: how an actor sees its critic. Saves more than half of backward(). `rows`
   /// chooses which rows of the last forward pass these are (`batch` of them; null: the first).
   void backwardInput(const float* parameters, std::size_t batch, const float* d_output,
                      std::size_t first, std::size_t count, float* d_input, MlpWorkspace& workspace,
                      const std::size_t* rows = nullptr) const;
-
-  /// Adds to d_input[0..count) the gradient by the inputs [first, first + count) where these are
-  /// the same in every row, summed over the rows: the first layer's weights times the gradient by
-  /// its biases, which the last backward() left in `gradient`.
-  void addSharedInputGradient(const float* parameters, const float* gradient, std::size_t first,
-                              std::size_t count, float* d_input) const;
 
  private:
   friend class MlpWorkspace;
