@@ -33,7 +33,7 @@ void bind(Settings& s, const std::string& prefix, ContextSettings& c) {
   s.bind(prefix + "latent_size", c.latent_size, "length of the task vector z",
          Range::between(1, 1000));
   s.bind(prefix + "context_batch", c.batch_size,
-         "context transitions of one update, and of one z to act with", Range::between(1, 1e6));
+         "transitions of one context, from which one z is inferred", Range::between(1, 1e6));
   s.bind(prefix + "context_buffer", c.buffer_size, "recent context transitions kept",
          Range::between(1, 1e9));
   s.bind(prefix + "context_window", c.window,

@@ -42,7 +42,6 @@ SacLearner::SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
       settings_(settings),
       networks_(env_->spec(), settings, static_cast<int>(task_input.size())),
       batch_(static_cast<std::size_t>(settings.batch_size)),
-      contexts_(requireContexts(settings)),
       observation_size_(networks_.observationSize()),
       action_size_(networks_.actionSize()),
       task_input_(requireTaskInput(std::move(task_input), settings)),
@@ -72,6 +71,7 @@ SacLearner::SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
       d_action_(batch_ * action_size_),
       d_heads_(2 * batch_ * action_size_),
       gradient_(std::max(networks_.actor().size(), networks_.critic(0).size())) {
+  const std::size_t contexts = requireContexts(settings);
   for (int k = 0; k < 2; ++k) {
     critic_workspaces_.emplace_back(networks_.critic(k), batch_);
     minimum_rows_[k].reserve(batch_);
@@ -81,7 +81,7 @@ SacLearner::SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
     const auto rows = static_cast<std::size_t>(settings.context.batch_size);
     const std::size_t latent = encoder.latentSize();
     const std::vector<double> zeros(latent);
-    for (std::size_t k = 0; k < contexts_; ++k) {
+    for (std::size_t k = 0; k < contexts; ++k) {
       drawn_.push_back({AlignedFloats(rows * encoder.rowSize()),
                         ContextEncoder::Workspace(encoder, rows),
                         {zeros, zeros},
@@ -93,7 +93,7 @@ SacLearner::SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
     task_input_.resize(latent);
     gradient_.resize(std::max(gradient_.size(), encoder.network().size()));
   }
-  update_inputs_.assign(contexts_, task_input_);
+  update_inputs_.assign(contexts, task_input_);
 }
 
 void SacLearner::resetTargets(const float* parameters) {
@@ -272,7 +272,7 @@ double SacLearner::updateCritic(int k, const float* parameters, Optimizer<float>
 double SacLearner::updateEncoder(const float* parameters, Optimizer<float>& optimizer) {
   const ContextEncoder& encoder = networks_.encoder();
   const std::size_t size = encoder.network().size();
-  const auto n = static_cast<double>(contexts_);
+  const auto n = static_cast<double>(drawn_.size());
   double kl = 0;
   std::fill_n(gradient_.begin(), size, 0.0f);
   for (DrawnTask& drawn : drawn_) {

@@ -15,7 +15,7 @@ namespace pmeta {
 struct ContextSettings {
   std::vector<int> hidden = {200, 200, 200};  ///< units of each hidden layer of the encoder
   int latent_size = 5;                        ///< length of z
-  int batch_size = 100;    ///< context transitions of one update, and of one z to act with
+  int batch_size = 100;    ///< transitions of one context, from which one z is inferred
   int buffer_size = 1000;  ///< recent context transitions kept
   /// In training a context's rows come from so many transitions in a row, as they do at test time,
   /// where all of them may be of one wrong guess; 0: from all that are kept, the sure among them.

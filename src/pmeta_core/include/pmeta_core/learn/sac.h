@@ -92,13 +92,13 @@ class SacLearner {
   double updateEncoder(const float* parameters, Optimizer<float>& optimizer);
   double updateActor(const float* parameters, Optimizer<float>& optimizer);
   void actionGradient(int k, const float* parameters);
-  std::size_t contextOf(std::size_t row) const { return row * contexts_ / batch_; }
+  std::size_t contextOf(std::size_t row) const { return row * update_inputs_.size() / batch_; }
   float* target(int k) { return targets_.data() + (k == 0 ? 0 : networks_.critic(0).size()); }
 
   std::unique_ptr<Env> env_;
   SacSettings settings_;
   SacNetworks networks_;
-  std::size_t batch_, contexts_, observation_size_, action_size_;
+  std::size_t batch_, observation_size_, action_size_;
   std::vector<float> task_input_;
   Temperature temperature_;
   ReplayBuffer replay_, context_;
