@@ -210,8 +210,9 @@ def task_figure(experiment, groups, figures, prefix):
     names = max((group.runs[0].task_names for group in shown), key=len)
     labels = [wrapped_name(name) for name in names]
     tasks = len(labels)
+    tasks_height = row_height(labels, 0.36) * tasks
     figure, axes = plt.subplots(len(shown), 2, squeeze=False, sharex=True, sharey=True,
-                                figsize=(10.4, 0.7 + len(shown) * (0.5 + row_height(labels, 0.36) * tasks)),
+                                figsize=(10.4, 0.7 + len(shown) * (0.5 + tasks_height)),
                                 constrained_layout=True)
     for row, group in zip(axes, shown):
         for axis, snapshot in zip(row, SNAPSHOTS):
