@@ -74,12 +74,25 @@ struct Comma : std::numpunct<char> {
   std::string do_grouping() const override { return "\3"; }
 };
 
-TEST(Format, HasDotsWhateverTheCppLocaleIs) {
-  const std::locale before = std::locale::global(std::locale(std::locale(), new Comma));
-  const std::string all = shortNumber(12345.5) + " " + significant(0.25, 2) + " " +
-                          shortCount(1500) + " " + duration(4.2);
-  std::locale::global(before);
-  EXPECT_EQ(all, "12345.50 0.25 1.5k 4.2 s");
+TEST(Format, ShowsStrangersTextWithoutObeyingIt) {
+  EXPECT_EQ(shown("grid_4x4"), "'grid_4x4'");
+  EXPECT_EQ(shown("a\x1b[31mb\n\x7f"), "'a?[31mb?" "?'");
+  EXPECT_EQ(shown("caf\xc3\xa9 \xe6\x97\xa5"), "'caf\xc3\xa9 \xe6\x97\xa5'");
+  EXPECT_EQ(shown("\xc2\x9b" "31m"), "'?31m'") << "U+009B begins a sequence as ESC [ does";
+  EXPECT_EQ(shown("a\xff" "b\xc0\xaf"), "'a?b?" "?'");
+  EXPECT_EQ(shown(std::string(60, 'x')), "'" + std::string(60, 'x') + "'");
+  EXPECT_EQ(shown(std::string(10000000, 'x')), "'" + std::string(60, 'x') + "...'");
+  EXPECT_EQ(shown(std::string(59, 'x') + "\xc3\xa9"), "'" + std::string(59, 'x') + "...'");
+}
+
+TEST(Format, PlainTextIsUtf8WithoutControlCharacters) {
+  for (const char* good : {"", "a b", "caf\xc3\xa9", "\xf0\x9f\xa4\x96"}) {
+    EXPECT_TRUE(isPlainText(good)) << good;
+  }
+  for (const char* bad : {"a\nb", "\x1b", "\x7f", "\xff", "\xc3", "\xc0\xaf", "\xed\xa0\x80",
+                          "\xf4\x90\x80\x80", "\xe0\x80\xaf", "\xc2\x85"}) {
+    EXPECT_FALSE(isPlainText(bad)) << shown(bad);
+  }
 }
 
 TEST(Format, HasDotsWhateverTheCLocaleIs) {

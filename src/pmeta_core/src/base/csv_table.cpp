@@ -12,11 +12,10 @@
 #include <memory>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 
 namespace pmeta {
 namespace {
-
-constexpr std::size_t kMaxShown = 60;  ///< characters of a cell in an error
 
 // zlib also reads plain files
 std::string readWhole(const std::string& path) {
@@ -51,13 +50,6 @@ std::vector<std::string> splitLine(const std::string& line) {
     }
   }
   return cells;
-}
-
-std::string shown(const std::string& cell) {
-  std::string text = cell.substr(0, kMaxShown);
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20; }, '?');
-  return "'" + text + (cell.size() > kMaxShown ? "..." : "") + "'";
 }
 
 std::string place(const std::string& source, long line) {

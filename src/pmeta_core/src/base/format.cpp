@@ -16,6 +16,34 @@ std::string fixed(double value, int decimals) {
   return text.str();
 }
 
+constexpr std::size_t kMostShown = 60;  // bytes
+
+// length of the UTF-8 character that begins at `at`; 0 if there is none (RFC 3629)
+std::size_t characterLength(const std::string& text, std::size_t at) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char first = byte(at);
+  if (first < 0x80) return 1;
+  const std::size_t length = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
+  if (first < 0xc2 || first > 0xf4 || at + length > text.size()) return 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(at + i) & 0xc0) != 0x80) return 0;
+  }
+  // forms that are too long, surrogates, and what is beyond U+10FFFF
+  const unsigned char second = byte(at + 1);
+  if ((first == 0xe0 && second < 0xa0) || (first == 0xed && second > 0x9f) ||
+      (first == 0xf0 && second < 0x90) || (first == 0xf4 && second > 0x8f)) {
+    return 0;
+  }
+  return length;
+}
+
+// C0 and C1 control characters: a terminal obeys both
+bool isControl(const std::string& text, std::size_t at, std::size_t length) {
+  const auto byte = static_cast<unsigned char>(text[at]);
+  if (length == 1) return byte < 0x20 || byte == 0x7f;
+  return byte == 0xc2 && static_cast<unsigned char>(text[at + 1]) < 0xa0;
+}
+
 std::string twoDigits(long value) {
   return value < 10 ? "0" + std::to_string(value) : std::to_string(value);
 }
@@ -53,6 +81,28 @@ std::string duration(double seconds) {
   const long whole = std::lround(seconds);
   if (whole < 3600) return std::to_string(whole / 60) + ":" + twoDigits(whole % 60) + " min";
   return std::to_string(whole / 3600) + ":" + twoDigits(whole / 60 % 60) + " h";
+}
+
+bool isPlainText(const std::string& text) {
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t length = characterLength(text, at);
+    if (length == 0 || isControl(text, at, length)) return false;
+    at += length;
+  }
+  return true;
+}
+
+std::string shown(const std::string& text) {
+  std::string out;
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t length = characterLength(text, at);
+    const std::size_t taken = length == 0 ? 1 : length;
+    if (at + taken > kMostShown) break;
+    out += length == 0 || isControl(text, at, length) ? "?" : text.substr(at, length);
+    at += taken;
+  }
+  return "'" + out + (at < text.size() ? "...'" : "'");
 }
 
 std::string padded(const std::string& text, std::size_t width, bool right) {

@@ -21,6 +21,13 @@ std::string shortCount(double value);
 /// "4.2 s", "1:05 min" or "2:03 h"; "-" where there is no number.
 std::string duration(double seconds);
 
+/// Is it UTF-8 without control characters, as names must be?
+bool isPlainText(const std::string& text);
+
+/// A text of unknown origin, fit to be shown: in quotes, cut after 60 bytes (never within a UTF-8
+/// character), with a ? for each control character and each byte that is not UTF-8.
+std::string shown(const std::string& text);
+
 /// The text with blanks up to `width` after it, or before it if `right`.
 std::string padded(const std::string& text, std::size_t width, bool right = false);
 
