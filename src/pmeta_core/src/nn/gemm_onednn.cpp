@@ -1,5 +1,7 @@
 #include <dnnl.h>
 #include <omp.h>
+#include <pthread.h>
+#include <signal.h>
 
 #include <string>
 
@@ -33,6 +35,32 @@ class OneThread {
   int before_;
 };
 
+// oneDNN's AVX-512 kernels may point the stack register at the heap: a signal's frame would be
+// written over whatever lies there, and a handler cannot prevent it. So none arrives on this thread
+// until the product is done, but for those that the thread raises itself. Costs half a microsecond.
+class SignalsHeld {
+ public:
+  SignalsHeld() { pthread_sigmask(SIG_BLOCK, &asynchronous(), &before_); }
+  ~SignalsHeld() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalsHeld(const SignalsHeld&) = delete;
+  SignalsHeld& operator=(const SignalsHeld&) = delete;
+
+ private:
+  static const sigset_t& asynchronous() {
+    static const sigset_t kSignals = [] {
+      sigset_t set;
+      sigfillset(&set);
+      for (const int raised : {SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGSEGV, SIGSYS, SIGTRAP}) {
+        sigdelset(&set, raised);
+      }
+      return set;
+    }();
+    return kSignals;
+  }
+
+  sigset_t before_;
+};
+
 }  // namespace
 
 void gemm(Transpose transpose_a, Transpose transpose_b, std::size_t m, std::size_t n, std::size_t k,
@@ -40,7 +68,8 @@ void gemm(Transpose transpose_a, Transpose transpose_b, std::size_t m, std::size
           float* c, std::size_t ldc) {
   if (m == 0 || n == 0) return;
   const auto size = [](std::size_t x) { return static_cast<dnnl_dim_t>(x); };
-  const OneThread guard;
+  const OneThread one_thread;
+  const SignalsHeld signals_held;
   const dnnl_status_t status =
       dnnl_sgemm(static_cast<char>(transpose_a), static_cast<char>(transpose_b), size(m), size(n),
                  size(k), alpha, a, size(lda), b, size(ldb), beta, c, size(ldc));
