@@ -65,7 +65,7 @@ BAD_WORDS = [
      "unknown target 'yaml'; known are: checkpoint csv layout message policy replay settings."),
     (["fuzz", "csv", "--seconds"], "--seconds needs a whole number, at least 1."),
     (["fuzz", "csv", "--seconds", "1m"], "--seconds needs a whole number, at least 1."),
-    (["test", "--msan"], "unknown option '--msan' of test: see ./pmeta --help."),
+    (["test", "--msan"], "unknown option '--msan' of test: see ./pmeta test --help."),
 ]
 
 
@@ -75,6 +75,35 @@ def test_bad_words_are_told_before_anything_is_built(words, sentence):
     assert result.returncode == 1
     assert result.stderr == "pmeta: %s\n" % sentence
     assert result.stdout == ""
+
+
+@pytest.fixture(scope="module")
+def bare_tree(tmp_path_factory):
+    """The front door and what its help needs, in a place where nothing has been built."""
+    top = tmp_path_factory.mktemp("bare")
+    shutil.copy(str(TOP / "pmeta"), str(top))
+    for folder in ("tools", "config", "src/pmeta_nodes/scripts"):
+        shutil.copytree(str(TOP / folder), str(top / folder),
+                        ignore=shutil.ignore_patterns("__pycache__"))
+    return top
+
+
+COMMANDS = sorted(path.stem for path in (TOP / "tools/commands").iterdir())
+
+
+def test_the_overview_has_every_command_once(bare_tree):
+    text = run([bare_tree / "pmeta", "--help"]).stdout
+    listed = [line.split()[0] for line in text.splitlines() if line.startswith("  ")]
+    assert sorted(listed) == COMMANDS
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_its_own_help_which_needs_no_build(bare_tree, command):
+    result = run([bare_tree / "pmeta", command, "--help"])
+    assert result.returncode == 0 and result.stderr == ""
+    assert result.stdout.startswith("usage: ") and command in result.stdout.splitlines()[0]
+    assert "Example" in result.stdout and "./pmeta %s" % command in result.stdout.split("Example")[1]
+    assert not (bare_tree / "build").exists()
 
 
 def test_an_unwritable_results_folder_is_told_before_anything_starts(tmp_path):

@@ -1,0 +1,9 @@
+# Build: build into build/ and devel/
+#
+# usage: ./pmeta build
+#
+# Every command does this first where something has changed.
+#
+# Example: JOBS=4 ./pmeta build
+
+command_main() { build; }

@@ -1,0 +1,38 @@
+# Learn: roslaunch an experiment
+#
+# usage: ./pmeta run EXPERIMENT [key:=value ...]
+#
+# A key is any setting (./pmeta settings EXPERIMENT) or a launch argument, e.g.
+#   rviz:=true       watch it in rviz, which stays open after the last round
+#   speed:=2         how fast rviz plays episodes
+#   hold:=true       stay after the last round until Ctrl-C
+#   record:=true     record all topics beside the run folder
+#   resume:=RUN_DIR  go on with a run that was stopped or killed
+#
+# Examples:
+#   ./pmeta run gridworld lambda:=5 seed:=1 rviz:=true
+#   ./pmeta run cart_pole resume:=RUN
+
+. "$TOP/tools/launch.sh"
+
+command_main() {
+  [ $# -ge 1 ] || die "which experiment? See ./pmeta run --help."
+  [ "$1" != convergence ] || exec "$TOP/pmeta" "$@"
+  prepare_launch "$@"
+  local launched=0
+  roslaunch "${LAUNCH[@]}" || launched=$?
+
+  # roslaunch ends with 0 even after a crash: the run folder is what counts
+  local status
+  status=$(run_status)
+  case $status in
+    finished)
+      echo "results: $RUN_DIR"
+      echo "figures: ./pmeta plot $RUN_DIR" ;;
+    stopped)
+      echo "pmeta: the run was stopped before its last round; what was done is in $RUN_DIR" >&2
+      exit 130 ;;
+    *)
+      die "the run did not finish (status '${status:-none}', roslaunch ended with $launched); see $RUN_DIR and ~/.ros/log." ;;
+  esac
+}

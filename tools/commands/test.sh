@@ -1,0 +1,38 @@
+# Check: set up, build and run every test
+#
+# usage: ./pmeta test [--asan | --tsan]
+#
+#   --asan  the C++ tests again under AddressSanitizer and UndefinedBehaviorSanitizer
+#   --tsan  the C++ tests again under ThreadSanitizer
+# Each of these has a build folder of its own, build_asan or build_tsan.
+#
+# Example: ./pmeta test
+
+run_tests() {
+  # Ubuntu has no Chromium package but a snap: there the tests that need such programs are skipped
+  use_noetic || setup $PACKAGES_TEST $PACKAGES_SCREENSHOT
+  build all tests
+  source_setup "$TOP/devel/setup.bash"
+  export ROS_HOME=$TOP/build/ros_home ROSCONSOLE_STDOUT_LINE_BUFFERED=1 ROS_IP=127.0.0.1
+  unset ROS_MASTER_URI DISPLAY
+  local results=$TOP/build/test_results
+  rm -rf "$results"
+  mkdir -p "$results/front_door"
+  echo "running the tests; output in build/tests.log"
+  # this ends with 0 when tests fail: the result files are what counts
+  (cd "$TOP" && make -C build -j1 run_tests) > "$TOP/build/tests.log" 2>&1 ||
+    { tail -n 60 "$TOP/build/tests.log" >&2; die "the tests could not be run."; }
+  (cd "$TOP" && "$PYTHON" -m pytest -q -p no:cacheprovider test \
+    --junitxml="$results/front_door/pytest.xml") || true
+  "$PYTHON" "$TOP/test/count_results.py" "$results"
+}
+
+command_main() {
+  case ${1:-} in
+    '') run_tests ;;
+    --asan | --tsan)
+      . "$TOP/tools/sanitizers.sh"
+      sanitize_with "$1" ;;
+    *) die "unknown option '$1' of test: see ./pmeta test --help." ;;
+  esac
+}

@@ -1,0 +1,22 @@
+# What every command has at hand.
+
+PYTHON=/usr/bin/python3
+SCRIPTS=$TOP/src/pmeta_nodes/scripts
+
+. "$TOP/tools/packages.sh"
+. "$TOP/tools/build.sh"
+
+die() {
+  echo "pmeta: $*" >&2
+  exit 1
+}
+
+# the settings file of an experiment
+config_of() {
+  local file=$TOP/config/$1.yaml
+  [ -f "$file" ] ||
+    die "unknown experiment '$1'; known are: $(cd "$TOP/config" && ls ./*.yaml | sed 's#\./##; s/\.yaml$//' | xargs)."
+  echo "$file"
+}
+
+pmeta_local() { "$TOP/devel/lib/pmeta_core/pmeta_local" "$@"; }
