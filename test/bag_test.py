@@ -82,7 +82,7 @@ def test_the_figure_shows_both_policies(tmp_path, message_class):
     folder = write_run(tmp_path, seed=3)
     kept = Kept()
     [run] = pb.read_bag(write_bag(tmp_path / "r.bag", folder, message_class))
-    pf.bag_curves(run, pb.name_of(run), kept)
+    pf.bag_curves(run, *pb.names_of([run]), kept)
     [(figure, name)] = kept.written
     assert name == "r_learning_curves"
     drawn = {line.get_label(): list(line.get_ydata()) for line in figure.axes[0].lines}
@@ -136,6 +136,56 @@ def test_no_installed_messages_are_needed(tmp_path, message_class):
                             stderr=subprocess.PIPE, universal_newlines=True, timeout=60,
                             env={"PATH": "/usr/bin:/bin"})
     assert result.returncode == 0, result.stderr
+
+
+def test_the_name_of_a_run_is_never_a_path(tmp_path, message_class):
+    folder = write_run(tmp_path)
+    path = str(tmp_path / "in.bag")
+    write_bag(path, folder, message_class, run_id="/../../../out")
+    plot(path, "--out", tmp_path / "a" / "b" / "c" / "d", "--format", "png")
+    assert os.listdir(str(tmp_path / "a" / "b" / "c" / "d")) == [
+        "in__.._.._.._out_learning_curves.png"]
+    assert sorted(os.listdir(str(tmp_path))) == ["a", "grid", "in.bag"]
+
+
+def test_runs_whose_names_become_the_same_have_figures_of_their_own():
+    class Run:
+        path = "x.bag"
+
+    runs = [Run(), Run(), Run(), Run()]
+    for run, run_id in zip(runs, ("a/b", "a b", "x", "a_b")):
+        run.run_id = run_id
+    assert pb.names_of(runs) == ["x_a_b", "x_a_b~2", "x", "x_a_b~3"]
+
+
+def test_returns_of_no_run_are_left_out(tmp_path, message_class):
+    path = write_bag(tmp_path / "r.bag", write_run(tmp_path), message_class)
+    with rosbag.Bag(path, "a") as bag:
+        for values in ({"round": 0}, {"round": 2, "policy_name": "x"},
+                       {"round": 3, "split_name": "test", "return_mean": float("inf")}):
+            message = message_class(**dict({"run_id": "r", "policy_name": "meta", "task": 1,
+                                            "split_name": "train", "scheduled": True}, **values))
+            bag.write("/pmeta/returns", message, genpy.Time(1000))
+    _, err = plot(path)
+    assert "holds 3 returns that are none of a run's" in err
+    assert list(pb.read_bag(path)[0].rounds) == [1, 2, 3, 4]
+
+
+def test_a_far_round_of_a_message_is_not_counted_up_to(tmp_path, message_class):
+    path = write_bag(tmp_path / "r.bag", write_run(tmp_path), message_class)
+    with rosbag.Bag(path, "a") as bag:
+        for policy in ("personal", "meta"):
+            bag.write("/pmeta/returns", message_class(
+                run_id="r", policy_name=policy, split_name="train", round=4000000000,
+                scheduled=True), genpy.Time(1000))
+    _, err = plot(path)
+    assert "lacks 3999999995 of the first 4000000000 rounds (first: round 5)" in err
+
+
+def test_a_bag_that_is_being_recorded_is_told(tmp_path):
+    path = tmp_path / "x.bag.active"
+    path.write_bytes(b"")
+    assert "%s is still being recorded" % path in fails(path)
 
 
 def test_rounds_and_returns_that_were_not_recorded_are_named(tmp_path, message_class):

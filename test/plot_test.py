@@ -227,7 +227,7 @@ def test_the_newer_of_two_differing_runs_counts(tmp_path):
     (lambda t: t.replace("personal,0", "personal,2", 1), 2, "neither adapts nor has test tasks"),
     (lambda t: t.replace("round,", "turn,"), 1, "header"),
     (lambda t: "", 1, "empty"),
-    (lambda t: t + "\n", 18, "1 fields"),
+    (lambda t: t.replace("\n2,", "\n\n2,", 1), 6, "is blank: remove it"),
 ])
 def test_malformed_rounds_are_refused_by_line(tmp_path, change, line, words):
     path = edit(write_run(tmp_path), "rounds.csv", change)
@@ -445,6 +445,60 @@ def test_latex_tables_follow_from_the_csv(deep_top, drawn):
 
 def test_latex_escapes_labels():
     assert pt.latex("η=1 a_b 5% λ") == r"$\eta$=1 a\_b 5\% $\lambda$"
+    assert pt.latex("a\\b{c}$d^e~f#g&h") == (
+        r"a\textbackslash{}b\{c\}\$d\textasciicircum{}e\textasciitilde{}f\#g\&h")
+
+
+def test_names_are_drawn_as_they_are_with_boxes_for_letters_without_a_font(tmp_path, recwarn):
+    folder = write_run(tmp_path, fresh=3)
+    edit(folder, "manifest.json", lambda t: t.replace("zeta 3,", "\u96ea $a_1$ 3,"))
+    _, err = plot(tmp_path)
+    assert (tmp_path / "figures" / "tasks_last.png").exists()
+    assert "lacks letters of" in err and not [w for w in recwarn if "lyph" in str(w.message)]
+    assert pd.plain("costs $5, or $6") == r"costs \$5, or \$6"
+    assert pd.plain(pd.plain("$a$")) == r"\$a\$"
+
+
+def test_a_mark_before_the_text_and_blank_lines_after_it_do_no_harm(tmp_path):
+    folder = write_run(tmp_path, fresh=3)
+    expected = plot(tmp_path, "--format", "png")[0]
+    for name in ("rounds.csv", "final.csv", "manifest.json", "config.yaml"):
+        edit(folder, name, lambda t: "\ufeff" + t + "\n \n")
+    assert plot(tmp_path, "--format", "png")[0] == expected
+
+
+@pytest.mark.parametrize("name, change, words", [
+    ("manifest.json", lambda t: t.replace('"rounds": 4', '"rounds": 4000000000'),
+     "ends with round 4 (personal) but its manifest.json says 4000000000 rounds"),
+    ("rounds.csv", lambda t: t.replace("4,1,", "4,999999999,"),
+     "has a task 999999999 but the run has"),
+    ("rounds.csv", lambda t: t.replace("4,1,", "4000000000,1,"), "ends with round 4000000000"),
+    ("manifest.json", lambda t: "[" * 10 ** 6, "is nested too deeply to be read"),
+    ("manifest.json", lambda t: '{"a":' * 10 ** 6, "is nested too deeply to be read"),
+    ("config.yaml", lambda t: t + "a: " + "[" * 10 ** 4, "is nested too deeply to be read"),
+    ("config.yaml", lambda t: t + "a: &a [1]\nb: [*a, *a]\n", "aliases are not read"),
+    ("config.yaml", lambda t: t + "evaluation_interval: 0\n", "evaluation_interval is '0'"),
+    ("config.yaml", lambda t: t + "evaluation_interval: soon\n", "evaluation_interval is 'soon'"),
+    ("manifest.json", lambda t: t.replace('"grid"', '"../x"'), "must be a plain name"),
+    ("manifest.json", lambda t: t.replace('"grid"', '"g\\u001b[31m"'), "experiment is 'g?[31m'"),
+])
+def test_an_altered_run_is_refused_in_one_sentence(tmp_path, name, change, words):
+    edit(write_run(tmp_path), name, change)
+    assert words in fails(tmp_path)
+
+
+def test_a_pipe_in_place_of_a_file_is_not_waited_for(tmp_path):
+    folder = write_run(tmp_path)
+    for name in ("config.yaml", "rounds.csv", "manifest.json"):
+        os.rename(os.path.join(folder, name), os.path.join(folder, "kept"))
+        os.mkfifo(os.path.join(folder, name))
+        assert "%s is not a regular file" % os.path.join(folder, name) in fails(tmp_path)
+        os.replace(os.path.join(folder, "kept"), os.path.join(folder, name))
+
+
+def test_a_file_is_no_folder_of_runs(tmp_path):
+    path = os.path.join(write_run(tmp_path), "rounds.csv")
+    assert "%s is a file: give the run folder" % path in fails(path)
 
 
 def test_returns_task_by_task(deep_top, deep, drawn):

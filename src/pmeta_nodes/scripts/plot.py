@@ -36,6 +36,11 @@ def parse_arguments(arguments):
     parser.add_argument("--format", metavar="LIST", default=",".join(FORMATS),
                         help="some of %s (default: both)" % ",".join(FORMATS))
     options = parser.parse_args(arguments)
+    for path in options.dirs:
+        if path.endswith(".bag.active") and os.path.isfile(path):
+            raise PlotError("%s is still being recorded, or its recording was cut off: end the "
+                            "recording, or mend it with rosbag reindex and rename it to .bag."
+                            % path)
     options.bags = [path for path in options.dirs if is_bag(path)]
     first = options.dirs[0]
     options.dirs = [path for path in options.dirs if path not in options.bags]
@@ -85,8 +90,8 @@ def plot_bags(options):
     os.makedirs(options.out, exist_ok=True)
     figures = pd.Figures(options.out, options.formats)
     with pd.style():
-        for run in runs:
-            pf.bag_curves(run, pb.name_of(run), figures)
+        for run, name in zip(runs, pb.names_of(runs)):
+            pf.bag_curves(run, name, figures)
     for path in figures.written:
         print("wrote " + path)
 

@@ -3,15 +3,18 @@
 The bag holds the definitions of its messages, so it reads anywhere that python3-rosbag is.
 """
 
+import math
 import os
+import re
 
 import numpy as np
 
-from pmeta_files import PlotError, warn
+from pmeta_files import PlotError, shown, warn
 from pmeta_returns import adaptations, key_of, with_stand_ins, words_of
 
 TOPIC = "/returns"
 TYPE = "pmeta_msgs/TaskReturn"
+KNOWN = (("personal", "train"), ("meta", "train"), ("meta", "test"))
 
 
 class BagRun:
@@ -21,16 +24,18 @@ class BagRun:
 
     def __init__(self, path, run_id, returns):
         self.path = path
-        self.run_id = run_id
+        self.run_id = shown(run_id)
         self.returns = returns
         curves = {}
         self.rounds = np.array(sorted(set.intersection(*map(set, returns.values()))), dtype=int)
         if not len(self.rounds):
             raise PlotError("%s has no round with returns of every policy." % path)
-        lacking = sorted(set(range(1, self.rounds[-1] + 1)) - set(self.rounds))
-        if lacking:
-            warn("%s lacks %d of the first %d rounds (first: round %d): they were not recorded, or not evaluated."
-                 % (path, len(lacking), self.rounds[-1], lacking[0]))
+        last = int(self.rounds[-1])
+        if len(self.rounds) < last:
+            # a message may say any round: only those that are there are gone through
+            first = next((i for i, r in enumerate(self.rounds, start=1) if r != i), None)
+            warn("%s lacks %d of the first %d rounds (first: round %d): they were not recorded, "
+                 "or not evaluated." % (path, last - len(self.rounds), last, first))
         for key, by_round in returns.items():
             tasks = max(len(by_task) for by_task in by_round.values())
             short = [r for r in self.rounds if len(by_round[r]) < tasks]
@@ -68,10 +73,14 @@ def _runs_of(path, bag):
     if not chosen:
         raise PlotError("%s has no topic returns of type %s; its topics are: %s."
                         % (path, TYPE, ", ".join(sorted(topics)) or "none"))
-    runs = {}
+    runs, strange = {}, 0
     for _, message, _ in bag.read_messages(topics=chosen):
         # bags of older runs lack these fields
         if not getattr(message, "scheduled", True):
+            continue
+        if ((message.policy_name, message.split_name) not in KNOWN or message.round < 1
+                or not math.isfinite(message.return_mean)):
+            strange += 1
             continue
         key = key_of(message.policy_name, message.split_name,
                      getattr(message, "context_episodes", 0))
@@ -79,6 +88,9 @@ def _runs_of(path, bag):
             message.round, {})
         # an agent that was started again may say it twice: the first counts, as in rounds.csv
         by_task.setdefault(message.task, message.return_mean)
+    if strange:
+        warn("%s holds %d returns that are none of a run's (no such policy, round 0, or no finite "
+             "number): they are left out." % (path, strange))
     runs = {run_id: returns for run_id, returns in runs.items()
             if "personal" in returns or adaptations(returns, "train")}
     if not runs:
@@ -86,7 +98,15 @@ def _runs_of(path, bag):
     return [BagRun(path, run_id, runs[run_id]) for run_id in sorted(runs)]
 
 
-def name_of(run):
-    """Of its figures: the bag's name and, if that says something else, the run's."""
-    stem = os.path.splitext(os.path.basename(run.path))[0]
-    return stem if run.run_id == stem else stem + "_" + run.run_id
+def names_of(runs):
+    """Of their figures: the bag's name and, if that says something else, the run's, made plain.
+
+    What a message says is never a path, and no two runs share a name.
+    """
+    names = []
+    for run in runs:
+        stem = os.path.splitext(os.path.basename(run.path))[0]
+        name = stem if run.run_id == stem else stem + "_" + re.sub(r"[^\w.+-]", "_", run.run_id)
+        number = 1 + sum(other == name or other.startswith(name + "~") for other in names)
+        names.append(name if number == 1 else "%s~%d" % (name, number))
+    return names

@@ -147,7 +147,7 @@ def draw_distance(data, figures, name):
         axis.set_xlabel("λ")
     left.set_title("all entries" + ("; slopes for λ ≥ %g" % start if start else ""), loc="left")
     right.set_title("the entry (s,a) where it is largest", loc="left")
-    left.set_ylabel("mean over tasks of |Q$_i$* − Q|²")
+    left.set_ylabel("mean over tasks of |Qᵢ* − Q|²")
     legend_right(axes[0])
     headline(figure, "Theorem 2(b): squared distance of personal to meta tables, last round")
     figures.save(figure, name)

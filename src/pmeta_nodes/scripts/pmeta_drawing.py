@@ -1,5 +1,6 @@
 """What every figure of pMeta shares: colours, style, panels, legends, and the files written."""
 
+import functools
 import os
 import re
 import textwrap
@@ -9,6 +10,10 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib import font_manager
+from matplotlib.text import Text
+
+from pmeta_files import warn
 
 # Okabe and Ito's colours, told apart by colour-blind readers as well
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
@@ -37,6 +42,7 @@ class Figures:
 
     def save(self, figure, name):
         """Writes and closes the figure; `name` may lie in a folder below `out`."""
+        make_plain(figure)
         os.makedirs(os.path.dirname(os.path.join(self.out, name)), exist_ok=True)
         for extension in self.formats:
             path = os.path.join(self.out, name + "." + extension)
@@ -52,6 +58,27 @@ class Figures:
         with open(path, "w", encoding="utf-8") as file:
             file.write(text)
         self.written.append(path)
+
+
+@functools.lru_cache(maxsize=None)
+def _font():
+    return font_manager.get_font(font_manager.findfont("DejaVu Sans"))
+
+
+@functools.lru_cache(maxsize=None)
+def plain(text):
+    """Text as it is to be drawn: no formula in it, and a box for a letter that the font lacks."""
+    known = "".join(c if c.isspace() or _font().get_char_index(ord(c)) else "\u25a1" for c in text)
+    if known != text:
+        warn("the font of the figures lacks letters of '%s': they are drawn as boxes." % text)
+    return re.sub(r"(?<!\\)\$", r"\\$", known)
+
+
+def make_plain(figure):
+    """All texts of a figure; those of ticks come from their formatters, see wrapped_name."""
+    for text in figure.findobj(Text):
+        if text.get_text() != plain(text.get_text()):
+            text.set_text(plain(text.get_text()))
 
 
 def folder_for(name, names):
@@ -80,13 +107,14 @@ def legend_right(axes):
 
 
 def headline(figure, text):
-    figure.suptitle(text.replace("$", "\\$"), x=0.01, ha="left", fontsize=11)
+    figure.suptitle(text, x=0.01, ha="left", fontsize=11)
 
 
 def wrapped_name(name, width=34):
     """A task's name in short lines, which end between two of its properties, not within one."""
     parts = re.split("(?<=[,:]) ", name)
-    return textwrap.fill(" ".join(part.replace(" ", "\u00a0") for part in parts), width)
+    lines = textwrap.fill(" ".join(part.replace(" ", "\u00a0") for part in parts), width)
+    return plain(lines)
 
 
 def row_height(labels, least):

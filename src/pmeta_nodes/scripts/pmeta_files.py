@@ -1,7 +1,9 @@
 """The files of a run folder, read and checked: what is wrong is named by file and line."""
 
 import contextlib
+import json
 import math
+import os
 import sys
 
 import numpy as np
@@ -148,11 +150,21 @@ def _fresh_names(snapshot, policy, split, own):
 
 
 def read_text(path):
+    """The text of a regular file, without the mark that some editors put before it."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        # to open a pipe would wait for its other end
+        raise PlotError("%s is not a regular file." % path)
     try:
-        with open(path, encoding="utf-8") as file:
+        with open(path, encoding="utf-8-sig") as file:
             return file.read()
     except UnicodeDecodeError:
-        raise PlotError("%s is not a text file." % path)
+        raise PlotError("%s is not a text file in UTF-8." % path)
+
+
+def shown(text, length=60):
+    """A stranger's text for a sentence or a figure: cut, and without control characters."""
+    plain = "".join(c if c.isprintable() else "?" for c in text[:length])
+    return plain + "…" * (len(text) > length)
 
 
 def read_csv(path, headers=()):
@@ -162,16 +174,19 @@ def read_csv(path, headers=()):
         raise PlotError("%s line 1: the file is empty." % path)
     lines = text.split("\n")
     if headers and lines[0] not in headers:
-        raise PlotError("%s line 1: the header must be '%s'." % (path, headers[0]))
+        raise PlotError("%s line 1: the header is '%s' but must be '%s'."
+                        % (path, shown(lines[0]), headers[0]))
     if lines[-1] != "":
         raise PlotError("%s line %d is truncated: it does not end." % (path, len(lines)))
+    while lines and not lines[-1].strip():
+        lines.pop()
     columns = lines[0].split(",")
     rows = []
-    for number, line in enumerate(lines[1:-1], start=2):
+    for number, line in enumerate(lines[1:], start=2):
         fields = line.split(",")
         if len(fields) != len(columns):
-            raise PlotError("%s line %d has %d fields instead of %d."
-                            % (path, number, len(fields), len(columns)))
+            raise PlotError("%s line %d %s." % (path, number, "has %d fields instead of %d" % (
+                len(fields), len(columns)) if line.strip() else "is blank: remove it"))
         rows.append((number, dict(zip(columns, fields))))
     return rows
 
@@ -193,13 +208,39 @@ def to_int(where, key, text):
         raise PlotError("%s: %s is '%s', not a whole number." % (where, key, text))
 
 
+def read_json(path):
+    """The object that a JSON file holds."""
+    try:
+        data = json.loads(read_text(path))
+    except ValueError as error:
+        raise PlotError("%s is not valid JSON: %s." % (path, error))
+    except RecursionError:
+        raise PlotError("%s is nested too deeply to be read." % path)
+    if not isinstance(data, dict):
+        raise PlotError("%s must hold a JSON object." % path)
+    return data
+
+
+class _Loader(yaml.SafeLoader):
+    """Without aliases, by which a short file can stand for an endless one."""
+
+    def compose_node(self, parent, index):
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()
+            raise yaml.composer.ComposerError(None, None, "aliases are not read", event.start_mark)
+        return super().compose_node(parent, index)
+
+
 def read_yaml(path):
     try:
-        data = yaml.safe_load(read_text(path))
+        data = yaml.load(read_text(path), Loader=_Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = " line %d" % (mark.line + 1) if mark else ""
-        raise PlotError("%s%s is not valid YAML." % (path, line))
+        problem = getattr(error, "problem", None)
+        raise PlotError("%s%s is not valid YAML%s." % (path, line, problem and ": " + problem or ""))
+    except RecursionError:
+        raise PlotError("%s is nested too deeply to be read." % path)
     if not isinstance(data, dict):
         raise PlotError("%s must hold settings as 'key: value' lines." % path)
     return data

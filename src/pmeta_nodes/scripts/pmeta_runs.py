@@ -6,15 +6,14 @@ the seed; a group's curves are seeds x rounds, each entry the mean return over t
 or over the test tasks. pmeta_returns says what curves there are.
 """
 
-import json
 import math
 import os
 import re
 
 import numpy as np
 
-from pmeta_files import (OWN_BEST, PlotError, read_columns, read_fresh, read_rounds, read_text,
-                         read_yaml, warn)
+from pmeta_files import (OWN_BEST, PlotError, read_columns, read_fresh, read_json, read_rounds,
+                         read_text, read_yaml, shown, warn)
 from pmeta_returns import POLICIES, adaptations, split_of, with_stand_ins, words_of
 
 CONVERGENCE_MARKS = ("statements.csv", "gradient.csv", "contraction.csv")
@@ -47,6 +46,9 @@ def find_folders(dirs):
     """Run folders and convergence folders in and below `dirs`, each once, in a fixed order."""
     runs, convergence = {}, {}
     for top in dirs:
+        if os.path.isfile(top):
+            raise PlotError("%s is a file: give the run folder, or a folder above run folders."
+                            % top)
         if not os.path.isdir(top):
             raise PlotError("there is no folder %s." % top)
         for folder, subfolders, files in os.walk(top, onerror=_refuse):
@@ -88,23 +90,28 @@ class Run:
         self.settings = _flatten(config)
         self.experiment = str(_required(folder, manifest, "experiment", str))
         self.algorithm = str(_required(folder, manifest, "algorithm", str))
-        if not re.match(r"[\w.+-]*\w", self.experiment) or os.sep in self.experiment:
+        # figures lie in folders of that name
+        if not re.fullmatch(r"[\w.+-]*\w[\w.+-]*", self.experiment) or len(self.experiment) > 100:
             raise PlotError("%s/manifest.json: experiment is '%s' but must be a plain name."
-                            % (folder, self.experiment))
+                            % (folder, shown(self.experiment)))
         self.seed = _required(folder, manifest, "seed", int)
         self.num_rounds = _required(folder, manifest, "rounds", int)
         self.manifest = manifest
         self.started = str(manifest.get("started") or "")
         self.commit = str(manifest.get("commit") or "unknown")
         self.optimal = _optimal_return(manifest)
-        # those that evaluated: every k-th and the last
-        interval = int(self.settings.get("evaluation_interval", 1))
-        self.rounds = np.array([r for r in range(1, self.num_rounds + 1)
-                                if r % interval == 0 or r == self.num_rounds])
         path = os.path.join(folder, "rounds.csv")
         returns, steps = read_rounds(path)
         if not steps:
             raise PlotError("%s holds no returns although the run has finished." % path)
+        self._check_bounds(path, returns)
+        # those that evaluated: every k-th and the last
+        interval = self.settings.get("evaluation_interval", 1)
+        if not isinstance(interval, int) or interval < 1:
+            raise PlotError("%s/config.yaml: evaluation_interval is '%s' but must be a whole number "
+                            "above 0." % (folder, shown(str(interval))))
+        self.rounds = np.array([r for r in range(1, self.num_rounds + 1)
+                                if r % interval == 0 or r == self.num_rounds])
         self.curves = with_stand_ins({key: self._curve(path, key, by_round)
                                       for key, by_round in returns.items()})
         self.returns = with_stand_ins(returns)
@@ -131,6 +138,20 @@ class Run:
         by_task = self.returns[key][self.rounds[place]]
         return np.array([by_task.get(task, math.nan) for task in self.tasks_of(key)])
 
+    def _check_bounds(self, path, returns):
+        """The manifest and the table agree on rounds and tasks: what follows counts up to them."""
+        for key, by_round in returns.items():
+            if max(by_round) != self.num_rounds:
+                raise PlotError("%s ends with round %d (%s) but its manifest.json says %d rounds."
+                                % (path, max(by_round), words_of(key), self.num_rounds))
+        found = set(task for by_round in returns.values() for by_task in by_round.values()
+                    for task in by_task)
+        listed = self.manifest.get("tasks")
+        count = max(len(found), len(listed) if isinstance(listed, list) else 0)
+        if max(found) >= count:
+            raise PlotError("%s has a task %d but the run has %d tasks, numbered from 0."
+                            % (path, max(found), count))
+
     def _count_tests(self, path):
         tests = set(task for by_task in self.returns.get("meta_test", {}).values()
                     for task in by_task)
@@ -140,10 +161,7 @@ class Run:
         return 1 + max(tests) - self.num_tasks if tests else 0
 
     def _curve(self, path, key, by_round):
-        last, policy = max(by_round), words_of(key)
-        if last != self.num_rounds:
-            raise PlotError("%s ends with round %d (%s) but its manifest.json says %d rounds."
-                            % (path, last, policy, self.num_rounds))
+        policy = words_of(key)
         tasks = max(len(by_task) for by_task in by_round.values())
         short = [r for r in by_round if len(by_round[r]) < tasks]
         if short:
@@ -181,13 +199,7 @@ def load_convergence(folders):
 
 def _finished_manifest(folder):
     """The manifest, or None and a warning if the run has not finished."""
-    path = os.path.join(folder, "manifest.json")
-    try:
-        manifest = json.loads(read_text(path))
-    except ValueError as error:
-        raise PlotError("%s is not valid JSON: %s." % (path, error))
-    if not isinstance(manifest, dict):
-        raise PlotError("%s must hold a JSON object." % path)
+    manifest = read_json(os.path.join(folder, "manifest.json"))
     if manifest.get("status") == "finished":
         return manifest
     done = manifest.get("rounds_done", "?")
@@ -204,8 +216,9 @@ def _finished_manifest(folder):
 def _task_names(manifest, count):
     """What tells each task from the others, from their descriptions: "zeta 3", …"""
     tasks = manifest.get("tasks")
-    known = {task.get("task"): str(task.get("description") or "").split(", ")
-             for task in (tasks if isinstance(tasks, list) else []) if isinstance(task, dict)}
+    known = {task.get("task"): shown(str(task.get("description") or ""), 200).split(", ")
+             for task in (tasks if isinstance(tasks, list) else [])
+             if isinstance(task, dict) and isinstance(task.get("task"), int)}
     parts = [known.get(task, [""]) for task in range(count)]
     if len(set(map(len, parts))) == 1:
         differ = [i for i in range(len(parts[0])) if len(set(p[i] for p in parts)) > 1]
@@ -233,7 +246,8 @@ def _optimal_return(manifest):
 
 
 def is_number(value):
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return (isinstance(value, (int, float)) and not isinstance(value, bool)
+            and abs(value) < math.inf)
 
 
 def _flatten(config, prefix=""):

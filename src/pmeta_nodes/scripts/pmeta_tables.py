@@ -54,7 +54,11 @@ PAPER = {
 }
 PAPER_LAMBDA = 20  # of its best table
 POLICIES = {"pp": "personal", "mp": "meta", "mp_test": "meta_test", "all": "all"}
-GREEK = {"α": r"$\alpha$", "β": r"$\beta$", "γ": r"$\gamma$", "η": r"$\eta$", "λ": r"$\lambda$"}
+LATEX = str.maketrans({
+    "\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
+    "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", "α": r"$\alpha$",
+    "β": r"$\beta$", "γ": r"$\gamma$", "η": r"$\eta$", "λ": r"$\lambda$",
+    **{c: "\\" + c for c in "_%&#${}"}})
 
 
 def summary_rows(experiments):
@@ -254,10 +258,7 @@ def plus_minus(mean, spread, sign="±"):
 
 
 def latex(text):
-    for old, new in [("\\", r"\textbackslash "), ("_", r"\_"), ("%", r"\%"), ("&", r"\&"),
-                     ("#", r"\#")] + list(GREEK.items()):
-        text = text.replace(old, new)
-    return text
+    return text.translate(LATEX)
 
 
 def latex_cell(row, name, measure, bold=False):
