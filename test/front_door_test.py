@@ -1,6 +1,7 @@
 """What a user meets at the door: programs, launch files, sweeps, the installed packages."""
 import csv
 import json
+import os
 import pathlib
 import shutil
 import signal
@@ -104,6 +105,52 @@ def test_every_command_has_its_own_help_which_needs_no_build(bare_tree, command)
     assert result.stdout.startswith("usage: ") and command in result.stdout.splitlines()[0]
     assert "Example" in result.stdout and "./pmeta %s" % command in result.stdout.split("Example")[1]
     assert not (bare_tree / "build").exists()
+
+
+BUILDS = """
+TOP=$1; . "$TOP/tools/common.sh"
+setup() { :; }
+run_make() { mkdir -p "$TOP/build" "$TOP/devel"; [ -f "$TOP/devel/program" ] || echo > "$TOP/devel/program"
+             find "$TOP/src" "$TOP/config" -type f -newer "$TOP/devel/program" -printf "newer: %f"; echo made; }
+build
+"""
+
+
+def remake(path, text, age):
+    path.write_text(text)
+    os.utime(str(path), (time.time() - age,) * 2)
+
+
+CHANGES = [
+    ("nothing", lambda top: None, ""),
+    ("a script", lambda top: (top / "src/plot.py").write_text("2"), ""),
+    ("a file is edited", lambda top: remake(top / "src/a.cpp", "2", 0), "newer: a.cpp"),
+    ("another is put back, older than the build",
+     lambda top: remake(top / "src/a.cpp", "2", 9000), "newer: a.cpp"),
+    ("a model", lambda top: remake(top / "config/models/m.xml", "2", 9000), "newer: m.xml"),
+    ("a file is new", lambda top: remake(top / "src/c d.cpp", "", 9000), "newer: c d.cpp"),
+    ("a file is gone", lambda top: (top / "src/b.cpp").unlink(), "made"),
+    ("a program is gone", lambda top: (top / "devel/program").unlink(), "made"),
+    ("build/ is gone", lambda top: shutil.rmtree(str(top / "build")), "made"),
+    ("devel/ is gone", lambda top: shutil.rmtree(str(top / "devel")), "made"),
+]
+
+
+@pytest.mark.parametrize("change,expected", [pytest.param(*c[1:], id=c[0]) for c in CHANGES])
+def test_what_has_changed_and_only_that_is_built(tmp_path, change, expected):
+    for folder in ("src", "config/models", "test"):
+        (tmp_path / folder).mkdir(parents=True)
+    for name in ("src/a.cpp", "src/b.cpp", "src/plot.py", "config/models/m.xml"):
+        remake(tmp_path / name, "1", 5000)
+    shutil.copytree(str(TOP / "tools"), str(tmp_path / "tools"))
+    build = ["bash", "-euo", "pipefail", "-c", BUILDS, "_", tmp_path]
+    first = run(build)
+    assert first.stdout == "made\n", first.stderr
+    change(tmp_path)
+    second = run(build)
+    assert second.returncode == 0, second.stderr
+    assert expected in second.stdout if expected else second.stdout == ""
+    assert run(build).stdout == ""
 
 
 def test_an_unwritable_results_folder_is_told_before_anything_starts(tmp_path):
