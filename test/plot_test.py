@@ -347,7 +347,7 @@ def deep(deep_top):
                              ("independent", 0)):
         folders[algorithm, value] = [
             write_run(deep_top, algorithm, s, lambda_=value, experiment="mountain_car",
-                      learner="dqn", fresh=100) for s in range(3)]
+                      learner="dqn", fresh=100, updates=3750) for s in range(3)]
     return folders
 
 
@@ -393,7 +393,7 @@ def table_row(text, *words):
 
 
 def test_the_paper_stands_beside_what_corresponds(drawn):
-    out = drawn[0].split("best returns", 1)[1].split("Returns are")[0]
+    out = drawn[0].split("best returns", 1)[1].split("experiment ")[0]
     ends = [re.split(" {2,}", line.strip())[-2:] for line in out.strip().split("\n")]
     assert ends == [["paper, λ", "paper, best"],
                     ["-93.05 ± 1.07", "-"], ["-111.15 ± 4.31", "-"],
@@ -401,6 +401,35 @@ def test_the_paper_stands_beside_what_corresponds(drawn):
                     ["-", "-"], ["-", "-111.34 ± 5.95"],
                     ["-", "-92.96 ± 2.08"], ["-", "-133.96 ± 3.25"]]
     assert re.search(r"independent +PP \(DQN\*\) ", out) and " all (DQN) " in out
+
+
+@pytest.mark.parametrize("change", [
+    lambda t: t.replace("hidden: [512, 512]", "hidden: [128, 128]"),
+    lambda t: t.replace("batch_size: 64", "batch_size: 32"),
+    lambda t: t.replace("updates_per_round: 3750", "updates_per_round: 500")])
+def test_the_paper_does_not_stand_beside_runs_of_other_sizes(tmp_path, change):
+    folder = write_run(tmp_path, experiment="mountain_car", learner="dqn", updates=3750)
+    assert "paper, best" in plot(tmp_path, "--what", "curves", "--format", "png")[0]
+    edit(folder, "config.yaml", change)
+    assert "paper, best" not in plot(tmp_path, "--what", "curves", "--format", "png")[0]
+
+
+def test_interquartile_means_and_comparisons_follow_from_the_files(tmp_path, sweep):
+    out, _ = plot(tmp_path, "--what", "sweep", "--format", "png")
+    rows = summary(tmp_path / "figures")
+    last = {key: [[float(row["return_mean"]) for row in rows_of(folder, "meta")
+                   if row["round"] == "4"] for folder in folders]
+            for key, folders in sweep.items() if key[0] != "independent"}
+    ours, theirs = last["pmeta", 10], last["model_averaging", 0]
+    flat = sorted(value for run in ours for value in run)
+    row = rows["pMeta-RL λ=10"]
+    assert float(row["mp_last_iqm"]) == pytest.approx(statistics.mean(flat[1:5]))
+    assert flat[0] <= float(row["mp_last_iqm_low"]) < float(row["mp_last_iqm_high"]) <= flat[-1]
+    wins = statistics.mean((a[task] > b[task]) + (a[task] == b[task]) / 2
+                           for task in range(2) for a in ours for b in theirs)
+    line = table_row(out.split("comparisons")[1], "MP of pMeta-RL λ=10 ", "model averaging")
+    assert "%.2f [" % wins in line and "3, 2" in line
+    assert rows["independent"]["mp_last_iqm"] == ""
 
 
 def test_no_paper_and_no_fresh_columns_without_them(tmp_path):

@@ -83,7 +83,7 @@ def top(tmp_path_factory):
 def folders(top):
     """{algorithm: [folder of seed 0, 1, 2]} of runs with networks and fresh episodes."""
     return {name: [write_run(top, name, seed, 20, experiment="mountain_car", learner="dqn",
-                             fresh=100) for seed in range(3)]
+                             fresh=100, updates=3750) for seed in range(3)]
             for name in ("pmeta", "model_averaging", "independent")}
 
 
@@ -101,7 +101,8 @@ def spread(values):
 
 @needs_chromium
 def test_tables_show_the_numbers_of_the_csv_files(folders, written):
-    best, learning, tasks, runs = look(written)["tables"]
+    best, learning, iqm, compared, tasks, runs = look(written)["tables"]
+    assert iqm[0][:3] == ["group", "IQM of", "seeds"] and compared[0][-1] == "P(improvement)"
     assert best[0] == ["group", "policy", "best", "last", "fresh (best)", "fresh (last)",
                        "paper, λ", "paper, best"]
     assert [row[:2] for row in best[1:]] == [

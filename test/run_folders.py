@@ -34,6 +34,9 @@ personal:
   lambda: {lambda_}
   eta: 0.08
   personal_init: meta
+dqn:
+  hidden: [512, 512]
+  batch_size: 64
 aggregation:
   beta: {beta}
 environment:

@@ -73,7 +73,7 @@ def plot_folders(options):
     figures = {kind: pd.Figures(options.out, options.formats) for kind in pk.KINDS}
     pk.draw(experiments, convergence, options.asked or pk.KINDS, figures)
     if rows:
-        print(pt.summary_text(rows))
+        print(pt.summary_text(rows, experiments))
     for path in written + [path for kind in pk.KINDS for path in figures[kind].written]:
         print("wrote " + path)
     for kind in options.asked:

@@ -138,6 +138,12 @@ class Run:
         by_task = self.returns[key][self.rounds[place]]
         return np.array([by_task.get(task, math.nan) for task in self.tasks_of(key)])
 
+    def mean_by_task(self, key):
+        """Of each task the mean over the rounds; NaN if it did not report in every one."""
+        by_round = [self.returns[key][r] for r in self.rounds]
+        return np.array([np.mean([by_task.get(task, math.nan) for by_task in by_round])
+                         for task in self.tasks_of(key)])
+
     def _check_bounds(self, path, returns):
         """The manifest and the table agree on rounds and tasks: what follows counts up to them."""
         for key, by_round in returns.items():
@@ -326,6 +332,19 @@ class Group:
         if policies not in self.policies:
             return None
         return np.array([run.by_task(policies, snapshot) for run in self.runs]), "evaluation"
+
+    def scores(self, policies, measure):
+        """Seeds x tasks of "last", "best", "auc" or "fresh_…", or None where one is missing."""
+        if measure.startswith("fresh_"):
+            key = (measure[len("fresh_"):], policies)
+            found = [run.fresh[key] for run in self.runs if key in run.fresh]
+        elif policies in self.policies:
+            found = [run.mean_by_task(policies) if measure == "auc"
+                     else run.by_task(policies, measure) for run in self.runs]
+        else:
+            return None
+        known = found and len(set(map(len, found))) == 1 and np.isfinite(found).all()
+        return np.array(found) if known else None
 
     @property
     def deep(self):

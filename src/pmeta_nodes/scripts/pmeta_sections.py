@@ -2,6 +2,7 @@
 
 import os
 
+import pmeta_comparisons as pc
 import pmeta_tables as pt
 from pmeta_files import read_text
 from pmeta_html import details, facts, heading, link, preformatted, table, text
@@ -14,7 +15,7 @@ def experiment_sections(experiment, groups, rows, folder):
     """Everything of one experiment but its figures; `folder` is where the report will lie."""
     members = [row for row in rows if row["experiment"] == experiment]
     return ([heading(2, experiment), facts(experiment_facts(groups))]
-            + return_tables(experiment, members) + task_tables(experiment, groups)
+            + return_tables(members, groups) + task_tables(experiment, groups)
             + [heading(3, "Runs and settings"), runs_table(groups, folder)]
             + [settings_of(group) for group in groups])
 
@@ -69,11 +70,17 @@ def number_ranges(values):
     return ", ".join("%d" % a if a == b else "%d–%d" % (a, b) for a, b in found)
 
 
-def return_tables(experiment, rows):
-    heads, lines = pt.best_cells(experiment, rows)
-    return [heading(3, "Returns: best and last round"), html_table(heads, lines, words=2),
+def return_tables(rows, groups):
+    heads, lines = pt.best_cells(rows)
+    found = [heading(3, "Returns: best and last round"), html_table(heads, lines, words=2),
             heading(3, "Learning: mean over the rounds (AUC)"),
-            html_table(*pt.learning_cells(rows))]
+            html_table(*pt.learning_cells(rows)),
+            heading(3, "Interquartile means, with 95 % intervals"),
+            html_table(*pc.iqm_cells(rows), words=2)]
+    heads, lines = pc.comparison_cells(groups)
+    if lines:
+        found += [heading(3, "Comparisons"), html_table(heads, lines, words=3)]
+    return found
 
 
 def html_table(heads, lines, words=1):

@@ -6,6 +6,7 @@ import os
 
 import numpy as np
 
+import pmeta_comparisons as pc
 import pmeta_runs as pr
 from pmeta_files import OWN_BEST, SNAPSHOTS
 
@@ -28,7 +29,7 @@ COLUMNS = ("experiment", "group", "algorithm", "lambda", "seeds", "pp_last_mean"
                for name in ("pp", "mp", "all") for what in ("mean", "std")) + tuple(
                    "%s_%s" % (measure, what) for measure in (
                        "pp_fresh_own_best", "mp_test_last", "mp_test_fresh_best",
-                       "mp_test_fresh_last") for what in ("mean", "std"))
+                       "mp_test_fresh_last") for what in ("mean", "std")) + pc.IQM_COLUMNS
 TASK_COLUMNS = ("experiment", "group", "snapshot", "policies", "episodes", "task", "name", "seeds",
                 "mean", "std", "min", "max")
 
@@ -53,7 +54,9 @@ PAPER = {
                  ("pmeta", "mp"): (-107.15, 4.10), ("pmeta", "pp"): (-93.05, 0.95)}},
 }
 PAPER_LAMBDA = 20  # of its best table
-POLICIES = {"pp": "personal", "mp": "meta", "mp_test": "meta_test", "all": "all"}
+# what its numbers presume, besides the tasks: networks, batch, and updates (C times R)
+PAPER_SETTINGS = {"dqn.hidden": (512, 512), "dqn.batch_size": 64}
+PAPER_UPDATES = {"cart_pole": 30 * 200, "mountain_car": 30 * 500}
 LATEX = str.maketrans({
     "\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
     "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", "α": r"$\alpha$",
@@ -71,10 +74,12 @@ def summary_rows(experiments):
                        seeds=len(group.runs), fresh_seeds=sum(bool(r.fresh) for r in group.runs))
             if group.algorithm == "pmeta":
                 row["lambda"] = group.settings.get("personal.lambda")
-            # only the summary's text and LaTeX ask for it
+            # only the summary's text and LaTeX ask for these
+            row["as_paper"] = as_in_paper(experiment, group)
             row["learner"] = group.settings.get("learner")
             row["adapts"] = len(group.adaptations("train")) > 1
-            for name, policy in POLICIES.items():
+            row.update(pc.iqm_columns(group))
+            for name, policy in pc.POLICIES.items():
                 if policy in group.policies:
                     # of test tasks no round is chosen
                     for measure in ("last", "auc", "best")[:1 if name == "mp_test" else None]:
@@ -86,6 +91,14 @@ def summary_rows(experiments):
                 row.update(paired_differences(group, pr.baseline_of(group, groups)))
             rows.append(row)
     return rows
+
+
+def as_in_paper(experiment, group):
+    """May the paper's numbers stand beside those of the group?"""
+    return experiment in PAPER and all(
+        group.settings.get(k) == v for k, v in PAPER_SETTINGS.items()) and (
+            int(group.rounds[-1]) * group.settings.get("updates_per_round", 1)
+            == PAPER_UPDATES[experiment])
 
 
 def _enter(row, name, values):
@@ -123,8 +136,8 @@ def csv_text(columns, rows):
     return text.getvalue()
 
 
-def summary_text(rows):
-    """For each experiment a table of its learning and one of its best returns."""
+def summary_text(rows, experiments):
+    """For each experiment tables of its learning, its best returns, and what few seeds allow."""
     lines = []
     for experiment in dict.fromkeys(row["experiment"] for row in rows):
         members = [row for row in rows if row["experiment"] == experiment]
@@ -132,8 +145,15 @@ def summary_text(rows):
         lines += aligned(*learning_cells(members))
         lines += ["", "experiment %s: best returns" % experiment]
         # the last returns stand in the table above
-        lines += aligned(*best_cells(experiment, members, [m for m in BEST_HEADS if m != "last"]),
+        lines += aligned(*best_cells(members, [m for m in BEST_HEADS if m != "last"]),
                          left=2)
+        if any(row["seeds"] > 1 for row in members):
+            lines += ["", "experiment %s: interquartile means" % experiment]
+            lines += aligned(*pc.iqm_cells(members), left=2)
+        heads, compared = pc.comparison_cells(experiments[experiment])
+        if compared:
+            lines += ["", "experiment %s: comparisons" % experiment]
+            lines += aligned(heads, compared, left=3)
         lines.append("")
     return "\n".join(lines + legend_lines(rows)) + "\n"
 
@@ -164,11 +184,10 @@ def legend_lines(rows):
            for row in rows):
         lines += ["all: every personal policy on every task, mean over all pairs (the paper's DQN;",
                   "its DQN* is the PP of independent)."]
-    if any(row["experiment"] in PAPER for row in rows):
-        lines += ["paper, λ and paper, best: its table by λ and its table of best returns,",
-                  "whatever the other settings here."]
-    lines.append("-: not run.")
-    return lines
+    if any(row["as_paper"] for row in rows):
+        lines += ["paper, λ and paper, best: its table by λ and its table of best returns, beside",
+                  "runs with its networks, batch and number of updates, whatever their other settings."]
+    return lines + pc.LEGEND + ["-: not run."]
 
 
 def learning_cells(rows):
@@ -180,18 +199,19 @@ def learning_cells(rows):
             plus_minus(row[mean], row[spread]) for mean, spread in shown.values()) for row in rows]
 
 
-def best_cells(experiment, rows, measures=tuple(BEST_HEADS)):
+def best_cells(rows, measures=tuple(BEST_HEADS)):
     """(heads, lines): a line for each group and policy, the paper's numbers where there are any."""
     measures = known_measures(rows, measures)
     heads = ("group", "policy") + tuple(BEST_HEADS[m] for m in measures)
-    if experiment in PAPER:
+    paper = any(row["as_paper"] for row in rows)
+    if paper:
         heads += ("paper, λ", "paper, best")
     lines = []
     for row in rows:
         label = row["group"]
         for name, policy in best_policies(row, measures):
             cells = (label, policy) + tuple(value_of(row, name, m) for m in measures)
-            if experiment in PAPER:
+            if paper:
                 cells += tuple(plus_minus(*pair) for pair in paper_values(row, name))
             lines.append(cells)
             label = ""
@@ -224,8 +244,10 @@ def value_of(row, name, measure):
 
 def paper_values(row, name):
     """Mean and deviation in the paper's table by lambda, and in its table of best returns."""
-    known = PAPER[row["experiment"]]
     unknown = (None, None)
+    if not row["as_paper"]:
+        return unknown, unknown
+    known = PAPER[row["experiment"]]
     strength = row["lambda"]
     by_lambda = known["by_lambda"].get(name, {}).get(strength, unknown)
     if row["algorithm"] == "pmeta" and strength != PAPER_LAMBDA:
@@ -339,7 +361,7 @@ def task_rows(experiment, groups):
     rows = []
     for group in groups:
         for snapshot in SNAPSHOTS:
-            for policies in POLICIES.values():
+            for policies in pc.POLICIES.values():
                 data = group.by_task(policies, snapshot)
                 names = group.runs[0].test_names if policies == "meta_test" else (
                     group.runs[0].task_names)
@@ -357,7 +379,7 @@ def task_rows(experiment, groups):
 
 def write_tables(experiments, rows, out):
     """Writes what there are rows for; returns the paths."""
-    texts = {"summary.txt": summary_text(rows), "summary.csv": csv_text(COLUMNS, rows),
+    texts = {"summary.txt": summary_text(rows, experiments), "summary.csv": csv_text(COLUMNS, rows),
              "best_returns.tex": best_returns_tex(rows),
              "lambda_table.tex": lambda_table_tex(experiments, rows)} if rows else {}
     written = []
