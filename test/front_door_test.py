@@ -283,6 +283,11 @@ def test_a_sweep_does_each_run_once_and_goes_on_where_it_stopped(tmp_path):
     assert rows_without_time(folder / names[0] / "rounds.csv") == expected
     assert sorted(path.name for path in folder.iterdir()) == names
 
+    (folder / names[2] / "manifest.json").unlink()
+    listed = run(command + ["--list"]).stdout.splitlines()
+    assert sorted(listed, key=lambda line: line.split()[1]) == [
+        "%s %s" % ("missing" if name == names[2] else "finished", folder / name) for name in names]
+
     # the same name for other settings would mix results
     other = run([LOCAL, "sweep", CONFIG, "lambda:=5,10", "algorithm:=pmeta,model_averaging",
                  "seed:=0-2", "rounds:=5", "results_dir:=%s" % tmp_path, "--name", "s"])

@@ -41,9 +41,11 @@ constexpr char kUsage[] =
   run CONFIG [key:=value ...]          run an experiment in this process
   run CONFIG resume:=RUN_DIR           go on with a run that was stopped or killed, from its newest
                                        checkpoints and with its own settings
-  sweep CONFIG key:=a,b,c ... [--name NAME] [--jobs N]
+  sweep CONFIG key:=a,b,c ... [--name NAME] [--jobs N] [--resume] [--list]
                                        run it for every combination of values; seed:=0-9 is a range.
-                                       Run again to go on where it stopped.
+                                       Run again to go on where it stopped: with the run that was
+                                       cut off, or with --resume within it, from its checkpoints.
+                                       --list tells the status of each run instead.
   convergence CONFIG [key:=value ...]  measure the theory's statements on known models
   check CONFIG [key:=value ...]        check the settings and print the effective ones as YAML
   key FILE                             make a key for key_file:=FILE; never overwrites
@@ -80,6 +82,8 @@ struct Arguments {
   std::string tasks;
   int task = -1;  ///< -1: not given
   int episodes = 100;
+  bool resume = false;
+  bool list = false;
   int jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
@@ -107,6 +111,10 @@ Arguments parseArguments(int argc, char** argv) {
       arguments.name = value(i);
     } else if (word == "--tasks") {
       arguments.tasks = value(i);
+    } else if (word == "--resume") {
+      arguments.resume = true;
+    } else if (word == "--list") {
+      arguments.list = true;
     } else if (word == "--jobs") {
       arguments.jobs = wholeNumber(word, value(i), 1, 1024);
     } else if (word == "--task") {
@@ -191,6 +199,14 @@ int sweep(Arguments arguments) {
   plan.jobs = arguments.jobs;
   plan.name =
       arguments.name.empty() ? std::filesystem::path(plan.config).stem().string() : arguments.name;
+  plan.resume = arguments.resume;
+  if (arguments.list) {
+    for (const Experiment& experiment : pmeta::planSweep(plan)) {
+      const std::string status = pmeta::runStatus(experiment.runDir());
+      std::cout << (status.empty() ? "missing" : status) << " " << experiment.runDir() << "\n";
+    }
+    return 0;
+  }
   int found = 0;
   int done = 0;
   int total = 0;

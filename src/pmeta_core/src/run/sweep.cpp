@@ -81,13 +81,17 @@ std::vector<std::vector<std::string>> combinations(const std::vector<Axis>& axes
   return all;
 }
 
-// the settings that decide a run's numbers: all but where it is written
+// the settings that decide a run's numbers: all but where it is written, and its checkpoints
 std::string identity(const std::string& yaml) {
   std::istringstream in(yaml);
   std::string line;
   std::string kept;
+  std::string section;
   while (std::getline(in, line)) {
-    if (line.rfind("results_dir:", 0) != 0 && line.rfind("run_id:", 0) != 0) kept += line + "\n";
+    if (!line.empty() && line.front() != ' ') section = line.substr(0, line.find(':'));
+    if (section != "results_dir" && section != "run_id" && section != "checkpoint") {
+      kept += line + "\n";
+    }
   }
   return kept;
 }
@@ -110,15 +114,10 @@ std::string nameRun(const Experiment& experiment, const std::vector<Axis>& axes)
   return name.empty() ? "run" : name;
 }
 
-// true if a finished run with these settings is there already; clears away one that was cut off
+// true if a finished run with these settings is there already
 bool findFinished(const Experiment& experiment) {
   const std::string dir = experiment.runDir();
-  const std::string status = runStatus(dir);
-  if (status.empty() || status != "finished") {
-    std::error_code error;
-    std::filesystem::remove_all(dir, error);
-    return false;
-  }
+  if (runStatus(dir) != "finished") return false;
   std::ifstream file(dir + "/config.yaml");
   std::ostringstream text;
   text << file.rdbuf();
@@ -127,6 +126,21 @@ bool findFinished(const Experiment& experiment) {
                 " has other settings: give this sweep another --name, or remove that folder.");
   }
   return true;
+}
+
+// where a run that was cut off goes on; its folder is cleared away if there is no such round
+ResumePoint startOf(const Experiment& experiment, bool resume) {
+  const std::string dir = experiment.runDir();
+  if (resume && !runStatus(dir).empty()) {
+    try {
+      return findResumePoint(experiment);
+    } catch (const Error&) {
+      // cut off before its first checkpoint, or of other settings
+    }
+  }
+  std::error_code error;
+  std::filesystem::remove_all(dir, error);
+  return {};
 }
 
 }  // namespace
@@ -144,7 +158,7 @@ std::vector<Experiment> planSweep(const SweepPlan& plan) {
     std::vector<std::string> placed = assignments;
     placed.push_back("results_dir:=" + base.settings().results_dir + "/sweeps/" + plan.name);
     placed.push_back("run_id:=" + nameRun(base, axes));
-    placed.push_back("checkpoint.interval:=0");  // a run that was cut off begins anew
+    if (!plan.resume) placed.push_back("checkpoint.interval:=0");
     runs.push_back(Experiment::load(plan.config, placed));
   }
   return runs;
@@ -185,11 +199,15 @@ std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
     try {
       for (std::size_t i = next++; i < open.size() && !stop && !failed; i = next++) {
         const Clock::time_point start = Clock::now();
-        RunLog log(*open[i]);
-        const LocalResult result =
-            runLocally(*open[i], &log, [&](const RoundBook::Round&) { return !stop; });
+        const ResumePoint point = startOf(*open[i], plan.resume);
+        RunLog log =
+            point.round > 0 ? RunLog::reopen(*open[i], point.rounds_done) : RunLog(*open[i]);
+        const LocalResult result = runLocally(
+            *open[i], &log, [&](const RoundBook::Round&) { return !stop; }, point.round);
         log.finish(result.stopped ? "stopped" : "finished");
         if (result.stopped) return;
+        std::error_code error;  // a finished run needs no checkpoints, which are most of its size
+        std::filesystem::remove_all(log.dir() + "/checkpoint", error);
         const std::lock_guard<std::mutex> lock(mutex);
         ++progress.done;
         progress.run_id = open[i]->settings().run_id;

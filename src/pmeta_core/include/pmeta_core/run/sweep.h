@@ -16,6 +16,9 @@ struct SweepPlan {
   /// "key:=a,b,c", "seed:=0-9" (a range of whole numbers), or "key:=value" for all runs.
   std::vector<std::string> assignments;
   int jobs = 1;  ///< runs at a time, one thread each
+  /// Runs make checkpoints (checkpoint.interval), and one that was cut off goes on from them;
+  /// otherwise it begins anew.
+  bool resume = false;
 };
 
 /// Progress of a sweep after one more run.
@@ -34,7 +37,7 @@ struct SweepProgress {
 /// may fix some) are one run. Throws Error before anything is run.
 std::vector<Experiment> planSweep(const SweepPlan& plan);
 
-/// Runs what is not finished yet, `plan.jobs` at a time; a run that was cut off begins anew. Stops
+/// Runs what is not finished yet, `plan.jobs` at a time. Stops
 /// early, keeping what is finished, when `stop` becomes true. Calls on_progress from one thread at
 /// a time. Returns the folder that holds the runs. Throws Error if a finished run there has other
 /// settings under the same name.
