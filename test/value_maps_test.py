@@ -96,7 +96,7 @@ def test_the_optimal_policy_takes_the_fewest_steps():
 
 
 def test_the_optimum_of_the_hardest_tracks_is_known():
-    # docs/RESULTS.md: -88.89 in the mean over five tracks; here one that needs several swings
+    # docs/results/mountain_car.md: -88.89 in the mean over five tracks; here one that needs several swings
     car = mc.MountainCar(3.5, 0.001, 0.0025)
     optimum = mc.Optimum(car, 0.99)
     steps = [len(car.trajectory(optimum.choose, start)[0]) - 1
