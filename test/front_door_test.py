@@ -3,11 +3,13 @@ import csv
 import json
 import os
 import pathlib
+import shlex
 import shutil
 import signal
 import subprocess
 import sys
 import time
+import xml.etree.ElementTree as ElementTree
 
 import pytest
 import yaml
@@ -216,6 +218,89 @@ def test_launching_takes_any_setting(tmp_path):
     assert "slip: [0.1]" in settings
     assert "sizes: [3, 4]" in settings
     assert "seed: 5" in settings
+
+
+def test_launching_takes_and_checks_what_no_argument_declares(tmp_path):
+    env = environment(tmp_path)
+    command = ["roslaunch", "--dump-params", "pmeta_nodes", "gridworld.launch"]
+    result = run(command + ["lamda:=5", "slip:=0.3"], env=env)
+    assert "/pmeta/config" not in result.stdout
+    assert ("pmeta: unknown setting 'lamda' (given as lamda:=5): did you mean 'personal.lambda'?"
+            in result.stderr)
+    result = run(command + ["sizes:=[4, 5, 6]", "slip:=0.3", "speed:=2"], env=env)
+    settings = yaml.safe_load(yaml.safe_load(result.stdout)["/pmeta/config"])
+    assert settings["environment"]["sizes"] == [4, 5, 6]
+    assert settings["environment"]["slip"] == [0.3]
+
+
+ODD = "it's $x \\ & <é> \"q\" 日本 (a) %20"
+
+
+def test_odd_characters_pass_through_a_launch_file(tmp_path):
+    home = tmp_path / ODD
+    home.mkdir()
+    env = environment(tmp_path)
+    env["ROS_HOME"] = str(home / "ros")
+    launch = ["pmeta_nodes", "half_cheetah_dir.launch", "results_dir:=%s" % home, "run_id:=odd",
+              "settings:=preset=quick  environment.model_file='%s'"
+              % (TOP / "config/models/half_cheetah.xml"), "record:=true"]
+    result = run(["roslaunch", "--dump-params"] + launch, env=env)
+    assert result.returncode == 0, result.stderr
+    settings = yaml.safe_load(yaml.safe_load(result.stdout)["/pmeta/config"])
+    assert settings["results_dir"] == str(home) and settings["run_id"] == "odd"
+    assert settings["preset"] == "quick"
+    recorder = run(["roslaunch", "--args", "/pmeta/recorder"] + launch, env=env)
+    assert recorder.returncode == 0, recorder.stderr
+    assert str(home / "half_cheetah_dir/odd.bag") in recorder.stdout
+
+
+@pytest.fixture(scope="module")
+def launch_arguments():
+    """Of experiment.launch: names and defaults."""
+    root = ElementTree.parse(str(TOP / "launch/experiment.launch")).getroot()
+    return {arg.get("name"): arg.get("default") for arg in root.findall("arg")
+            if "value" not in arg.attrib}
+
+
+def check_launch(*words):
+    return run([TOP / "devel/lib/pmeta_nodes/prepare_run", "--check",
+                TOP / "launch/gridworld.launch", CONFIG, *words])
+
+
+def test_run_takes_every_launch_argument_and_refuses_half_true_switches(tmp_path, launch_arguments):
+    assert "view_prefix" in launch_arguments
+    where = "results_dir:=%s" % tmp_path
+    kept = [name for name, default in launch_arguments.items() if default != ""]
+    for name in kept + ["uplink"]:
+        result = check_launch(where, "%s:=%s" % (name, "true"))
+        assert result.returncode == 0, result.stderr
+    for name in ("rviz", "view", "hold", "agents", "record"):
+        assert name in kept
+        assert check_launch(where, name + ":=0").returncode == 0
+        result = check_launch(where, name + ":=yes")
+        assert result.returncode == 1
+        assert result.stderr == "pmeta: %s is 'yes' but must be true or false.\n" % name
+    assert check_launch("results_dir:=$(x)").stderr == (
+        "pmeta: results_dir is '$(x)', but roslaunch takes '$(' for a substitution.\n")
+    assert check_launch(where, "n:=1:=2").returncode == 1
+    result = check_launch("results_dir:=%s" % (tmp_path / ODD), "sizes:=[4, 5, 6]", "run_id:=odd")
+    assert result.stdout == "%s\n3\n" % (tmp_path / ODD / "gridworld/odd")
+
+
+def test_run_takes_a_settings_file_of_ones_own(tmp_path):
+    own = tmp_path / "my own.yaml"
+    own.write_text("experiment: mine\nenvironment:\n  name: gridworld\n  sizes: [3]\n")
+    env = dict(environment(tmp_path), ROS_HOME=str(tmp_path / "it's"))
+    result = run([TOP / "pmeta", "run", own, "rounds:=2", "pace:=0", "run_id:=own"], env=env,
+                 timeout=600)
+    assert result.returncode == 0, result.stderr
+    folder = tmp_path / "it's/pmeta/mine/own"
+    assert json.loads((folder / "manifest.json").read_text())["status"] == "finished"
+    last = result.stdout.splitlines()[-1]
+    assert shlex.split(last) == ["figures:", "./pmeta", "plot", str(folder)]
+    assert "starting the aggregator and 1 agent\n" in result.stdout
+    missing = run([TOP / "pmeta", "run", tmp_path / "no.yaml"])
+    assert missing.stderr == "pmeta: there is no settings file '%s'.\n" % (tmp_path / "no.yaml")
 
 
 def test_the_launch_file_starts_an_agent_for_each_task_of_the_settings(tmp_path):

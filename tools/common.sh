@@ -11,11 +11,17 @@ die() {
   exit 1
 }
 
-# the settings file of an experiment
+# the settings file of an experiment, which is a name of config/ or a file of the user's own
 config_of() {
   local file=$TOP/config/$1.yaml
-  [ -f "$file" ] ||
-    die "unknown experiment '$1'; known are: $(cd "$TOP/config" && ls ./*.yaml | sed 's#\./##; s/\.yaml$//' | xargs)."
+  case $1 in
+    */* | *.yaml | *.yml)
+      [ -e "$1" ] || die "there is no settings file '$1'."
+      file=$(realpath "$1") ;;
+    *)
+      [ -f "$file" ] ||
+        die "unknown experiment '$1'; known are: $(cd "$TOP/config" && ls ./*.yaml | sed 's#\./##; s/\.yaml$//' | xargs)." ;;
+  esac
   echo "$file"
 }
 

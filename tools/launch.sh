@@ -1,42 +1,31 @@
 # From the words of run and screenshot to what roslaunch is called with.
 
-# value of a top-level key in YAML on standard input
-yaml_value() { sed -n "s/^$1: *//p" | sed 's/^"\(.*\)"$/\1/'; }
-
-# Checks an experiment's key:=value assignments, builds, and sets LAUNCH (what roslaunch is called
-# with) and RUN_DIR.
+# Builds, checks an experiment's key:=value assignments, and sets LAUNCH (what roslaunch is called
+# with), RUN_DIR and AGENTS (how many).
 prepare_launch() {
-  local experiment=$1 config
+  local experiment=$1 config file=$1.launch word checked
   shift
   config=$(config_of "$experiment")
-  [ -f "$TOP/launch/$experiment.launch" ] || die "$experiment has no launch file in launch/."
-  local assignments=() extra=() assignment
-  LAUNCH=(pmeta_nodes "$experiment.launch")
-  for assignment in "$@"; do
-    case $assignment in
-      rviz:=* | view:=* | view_prefix:=* | speed:=* | hold:=* | record:=*) LAUNCH+=("$assignment") ;;
-      settings:=*) die "settings:= is for roslaunch; here give each setting as key:=value." ;;
-      preset:=* | seed:=* | algorithm:=* | lambda:=* | rounds:=* | pace:=* | results_dir:=* | run_id:=* | \
-        key_file:=* | resume:=*)
-        assignments+=("$assignment")
-        LAUNCH+=("$assignment") ;;
-      ?*:=*)
-        assignments+=("$assignment")
-        extra+=("${assignment/:=/=}") ;;
-      *) die "'$assignment' is not an assignment: write key:=value." ;;
-    esac
+  LAUNCH=()
+  if [ "$config" != "$TOP/config/$experiment.yaml" ]; then
+    file=experiment.launch
+    LAUNCH=("config:=$config")
+  fi
+  [ -f "$TOP/launch/$file" ] || die "$experiment has no launch file in launch/."
+  for word in "$@"; do
+    [[ $word == ?*:=* ]] || die "'$word' is not an assignment: write key:=value."
   done
   ensure_built
 
-  # bad settings are told here, in a sentence, before anything starts
-  local effective
-  effective=$(pmeta_local check "$config" "${assignments[@]}")
-  case " ${assignments[*]} " in
-    *" run_id:="* | *" resume:="*) ;;
-    *) LAUNCH+=("run_id:=$(yaml_value run_id <<< "$effective")") ;;
+  # what is wrong is told here, in a sentence, before anything starts
+  checked=$("$TOP/devel/lib/pmeta_nodes/prepare_run" --check "$TOP/launch/$file" "$config" "$@")
+  { read -r RUN_DIR; read -r AGENTS; } <<< "$checked"
+  # without it the name would be that of the second in which roslaunch reads this
+  case " $*" in
+    *" run_id:="?* | *" resume:="?*) ;;
+    *) LAUNCH+=("run_id:=$(basename "$RUN_DIR")") ;;
   esac
-  [ ${#extra[@]} = 0 ] || LAUNCH+=("settings:=${extra[*]}")
-  RUN_DIR=$(yaml_value results_dir <<< "$effective")/$(yaml_value experiment <<< "$effective")/$(yaml_value run_id <<< "$effective")
+  LAUNCH=(pmeta_nodes "$file" "${LAUNCH[@]}" "$@")
 }
 
 # of the run in RUN_DIR

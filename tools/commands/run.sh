@@ -2,7 +2,9 @@
 #
 # usage: ./pmeta run EXPERIMENT [key:=value ...]
 #
-# A key is any setting (./pmeta settings EXPERIMENT) or a launch argument, e.g.
+# EXPERIMENT is a file of config/ without .yaml, or the path of a settings file of your own. A key is
+# any setting (./pmeta settings EXPERIMENT) or any launch argument (roslaunch --ros-args pmeta_nodes
+# experiment.launch lists them), e.g.
 #   rviz:=true       watch it in rviz, which stays open after the last round
 #   speed:=2         how fast rviz plays episodes
 #   hold:=true       stay after the last round until Ctrl-C
@@ -20,6 +22,7 @@ command_main() {
   [ "$1" != convergence ] || exec "$TOP/pmeta" "$@"
   prepare_launch "$@"
   local launched=0
+  echo "starting the aggregator and $AGENTS agent$([ "$AGENTS" = 1 ] || echo s)"
   roslaunch "${LAUNCH[@]}" || launched=$?
 
   # roslaunch ends with 0 even after a crash: the run folder is what counts
@@ -28,7 +31,7 @@ command_main() {
   case $status in
     finished)
       echo "results: $RUN_DIR"
-      echo "figures: ./pmeta plot $RUN_DIR" ;;
+      printf 'figures: ./pmeta plot %q\n' "$RUN_DIR" ;;
     stopped)
       echo "pmeta: the run was stopped before its last round; what was done is in $RUN_DIR" >&2
       exit 130 ;;

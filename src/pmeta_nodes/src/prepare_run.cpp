@@ -2,7 +2,6 @@
 // starts, writes the launch file that holds one agent for each task, and prints the effective
 // settings, which become the parameter that all nodes read.
 #include <algorithm>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -10,7 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "launch_parent.h"
+#include "launch_words.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 #include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/run_log.h"
@@ -23,20 +25,19 @@ using pmeta::Experiment;
 constexpr char kHelp[] =
     R"(prepare_run: checks a run's settings, writes the launch file of its agents, prints the settings.
 
-  rosrun pmeta_nodes prepare_run CONFIG AGENTS_LAUNCH [--record] [key:=value ...]
+  rosrun pmeta_nodes prepare_run CONFIG AGENTS_LAUNCH [key:=value ...]
+  rosrun pmeta_nodes prepare_run --check LAUNCH_FILE CONFIG [key:=value ...]
 
 CONFIG         settings file; with resume:=RUN_DIR the run there goes on, with its own settings
-AGENTS_LAUNCH  launch file to write: a task_agent for each training and test task and, with --record, rosbag
+AGENTS_LAUNCH  launch file to write: a task_agent for each training and test task and, with record:=true, rosbag
+LAUNCH_FILE    launch file of pMeta's: checks what it is to be called with, and prints the run's folder and
+               how many agents it has
 key:=value     settings that override the file's; an empty value leaves the file's. The value of
-               `settings` is itself a list of assignments: "settings:=slip=0.1 beta=0.5".
-Called by the launch files; exits with 1 and one sentence if the settings are bad.
+               `settings` is itself a list of assignments: "settings:=slip=0.1 sizes=[4, 5]".
+Launch files call it with --launch FOLDER LINES, where LINES has the words, a line each; then the
+settings on roslaunch's own command line count too, declared or not.
+Exits with 1 and one sentence if the settings are bad.
 )";
-
-std::string trim(const std::string& text) {
-  const auto begin = text.find_first_not_of(" \t");
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
-}
 
 // what the launch file passes: empty values mean "as in the file"
 std::vector<std::string> readAssignments(const std::vector<std::string>& words) {
@@ -45,20 +46,13 @@ std::vector<std::string> readAssignments(const std::vector<std::string>& words) 
     const auto split = word.find(":=");
     if (split == std::string::npos)
       throw Error("'" + word + "' is not an assignment: write key:=value.");
-    const std::string value = trim(word.substr(split + 2));
-    if (value.empty()) continue;
+    if (split + 2 == word.size()) continue;
     if (word.substr(0, split) == "settings") {
-      std::istringstream in(value);
-      // a plain "=" here: roslaunch takes no second ":=" in an argument
-      for (std::string one; in >> one;) {
-        const auto equals = one.find('=');
-        if (equals == std::string::npos || equals == 0 || one[equals - 1] == ':') {
-          throw Error("'" + one + "' in settings is not of the form key=value.");
-        }
-        assignments.push_back(one.replace(equals, 1, ":="));
+      for (std::string& one : pmeta_nodes::splitSettings(word.substr(split + 2))) {
+        assignments.push_back(std::move(one));
       }
     } else {
-      assignments.push_back(word.substr(0, split) + ":=" + value);
+      assignments.push_back(word);
     }
   }
   return assignments;
@@ -75,6 +69,19 @@ std::string takeAssignment(std::vector<std::string>& assignments, const std::str
   return value;
 }
 
+// a launch argument that is "true" or "false", taken out of the assignments
+bool takeFlag(std::vector<std::string>& assignments, const std::string& key, bool by_default) {
+  const std::string value = takeAssignment(assignments, key);
+  if (value.empty()) return by_default;
+  for (const char* yes : {"true", "True", "1"}) {
+    if (value == yes) return true;
+  }
+  for (const char* no : {"false", "False", "0"}) {
+    if (value == no) return false;
+  }
+  throw Error(key + " is " + pmeta::shown(value) + " but must be true or false.");
+}
+
 std::string escapeXml(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -88,14 +95,19 @@ std::string escapeXml(const std::string& text) {
       case '"':
         out += "&quot;";
         break;
-      case '$':
-        out += "$$";  // roslaunch would substitute it
-        break;
       default:
         out += c;
     }
   }
   return out;
+}
+
+// as one word of a node's args, which roslaunch splits like a shell
+std::string quoted(std::string text) {
+  for (std::size_t at = 0; (at = text.find('\'', at)) != std::string::npos; at += 4) {
+    text.replace(at, 1, "'\\''");
+  }
+  return "'" + text + "'";
 }
 
 std::string agentsLaunch(const Experiment& experiment, bool record) {
@@ -110,8 +122,8 @@ std::string agentsLaunch(const Experiment& experiment, bool record) {
   }
   if (record) {
     const std::string bag = experiment.runDir() + ".bag";
-    xml << "  <node name=\"recorder\" pkg=\"rosbag\" type=\"record\" args=\"-O '" << escapeXml(bag)
-        << "' -e '/pmeta/.*' -x /pmeta/playback\"/>\n";
+    xml << "  <node name=\"recorder\" pkg=\"rosbag\" type=\"record\" args=\"-O "
+        << escapeXml(quoted(bag)) << " -e '/pmeta/.*' -x /pmeta/playback\"/>\n";
   }
   xml << "</launch>\n";
   return xml.str();
@@ -132,20 +144,11 @@ void removeOldLaunchFiles(const std::filesystem::path& file) {
   }
 }
 
-int prepare(std::vector<std::string> words) {
-  const auto flag = std::find(words.begin(), words.end(), "--record");
-  const bool record = flag != words.end();
-  if (record) words.erase(flag);
-  words.erase(std::remove(words.begin(), words.end(), "--no-record"), words.end());
-  if (words.size() < 2) throw Error("give CONFIG and AGENTS_LAUNCH; see prepare_run --help.");
-  const std::string config = words[0];
-  const std::filesystem::path launch_file = words[1];
-  words.erase(words.begin(), words.begin() + 2);
-
-  std::vector<std::string> assignments = readAssignments(words);
+// the run that the words ask for, if it can be started
+Experiment checkedExperiment(const std::string& config, std::vector<std::string> assignments) {
   const std::string resume = takeAssignment(assignments, "resume");
-  const Experiment experiment = resume.empty() ? Experiment::load(config, assignments)
-                                               : Experiment::resume(resume, assignments, config);
+  Experiment experiment = resume.empty() ? Experiment::load(config, assignments)
+                                         : Experiment::resume(resume, assignments, config);
   const pmeta::Authenticator probe(experiment.settings().key_file);
   if (resume.empty()) {
     pmeta::requireWritable(experiment.settings().results_dir + "/" +
@@ -158,6 +161,36 @@ int prepare(std::vector<std::string> words) {
   } else {
     pmeta::requireResumable(experiment.runDir());
   }
+  return experiment;
+}
+
+// what is beside the settings, taken out of the assignments; true: record a bag
+bool takeRecord(std::vector<std::string>& assignments) {
+  const bool record = takeFlag(assignments, "record", false);
+  for (const char* key : {"rviz", "view", "hold", "agents"}) takeFlag(assignments, key, false);
+  return record;
+}
+
+int check(const std::vector<std::string>& words) {
+  if (words.size() < 2)
+    throw Error("--check needs LAUNCH_FILE and CONFIG; see prepare_run --help.");
+  std::vector<std::string> assignments = readAssignments(pmeta_nodes::handedOn(
+      {words.begin() + 2, words.end()}, pmeta_nodes::readLaunchFile(words[0])));
+  takeRecord(assignments);
+  const Experiment experiment = checkedExperiment(words[1], assignments);
+  std::cout << experiment.runDir() << "\n" << experiment.totalTasks() << "\n";
+  return 0;
+}
+
+int prepare(std::vector<std::string> words) {
+  if (words.size() < 2) throw Error("give CONFIG and AGENTS_LAUNCH; see prepare_run --help.");
+  const std::string config = words[0];
+  const std::filesystem::path launch_file = words[1];
+  words.erase(words.begin(), words.begin() + 2);
+
+  std::vector<std::string> assignments = readAssignments(words);
+  const bool record = takeRecord(assignments);
+  const Experiment experiment = checkedExperiment(config, assignments);
   for (const std::string& note : experiment.notes()) std::cerr << "pmeta: " << note << "\n";
   std::cerr << "settings\n" << experiment.table();
 
@@ -169,6 +202,15 @@ int prepare(std::vector<std::string> words) {
   return 0;
 }
 
+int answer(std::vector<std::string> words) {
+  if (words.front() == "--check") return check({words.begin() + 1, words.end()});
+  if (words.front() == "--launch") {
+    if (words.size() != 3) throw Error("--launch needs FOLDER and LINES; see prepare_run --help.");
+    words = pmeta_nodes::wordsOfLaunch(words[2], pmeta_nodes::launchCommand(), words[1]);
+  }
+  return prepare(std::move(words));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -178,7 +220,7 @@ int main(int argc, char** argv) {
     return words.empty() ? 2 : 0;
   }
   try {
-    return prepare(words);
+    return answer(words);
   } catch (const std::exception& error) {
     std::cerr << "pmeta: " << error.what() << std::endl;
     return 1;
