@@ -96,6 +96,8 @@ void MetaAggregatorNode::State::loadState(pmeta::StateReader& reader) {
 std::unique_ptr<pmeta::RunLog> MetaAggregatorNode::openLog(bool resume) {
   const std::string status = pmeta::runStatus(experiment_.runDir());
   if (!resume || status.empty()) return std::make_unique<pmeta::RunLog>(experiment_);
+  std::optional<pmeta::RunLock> lock;
+  if (status != "finished") lock.emplace(experiment_.runDir());
   std::vector<std::string> refused;
   const int rounds = experiment_.settings().rounds;
   const int round = checkpoints_.newest(rounds, refused);
@@ -104,9 +106,10 @@ std::unique_ptr<pmeta::RunLog> MetaAggregatorNode::openLog(bool resume) {
     State state{aggregator_, book_};
     checkpoints_.load(round, state);
   }
-  if (status == "finished") return nullptr;
+  if (!lock) return nullptr;
   ROS_INFO("going on after round %d.", round);
-  return std::make_unique<pmeta::RunLog>(pmeta::RunLog::reopen(experiment_, book_.roundsTaken()));
+  return std::make_unique<pmeta::RunLog>(
+      pmeta::RunLog::reopen(experiment_, book_.roundsTaken(), std::move(*lock)));
 }
 
 MetaAggregatorNode::~MetaAggregatorNode() {
@@ -162,9 +165,9 @@ void MetaAggregatorNode::work() {
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());
     failed_ = true;
+    if (log_) log_->fail(error.what());
     try {
       publishRound(RoundSummary::STOPPED, error.what());
-      if (log_) log_->finish("failed");
     } catch (const std::exception& second) {
       ROS_FATAL("%s", second.what());
     }

@@ -34,6 +34,15 @@ TEST(Experiment, PmetaTakesItsSettingsAsTheyStand) {
   EXPECT_EQ(e.notes(), Notes{});
 }
 
+TEST(Experiment, TheSettingsHashIsThatOfWhatDefinesARun) {
+  const std::string hash = gridExperiment({"run_id:=a"}).settingsHash();
+  EXPECT_EQ(hash.size(), 64u);
+  EXPECT_EQ(gridExperiment({"run_id:=a", "results_dir:=/elsewhere", "pace:=1"}).settingsHash(),
+            hash);
+  EXPECT_NE(gridExperiment({"run_id:=a", "lambda:=5"}).settingsHash(), hash);
+  EXPECT_NE(gridExperiment({"run_id:=b"}).settingsHash(), hash);
+}
+
 TEST(Experiment, ModelAveragingIsSettings) {
   const Experiment e = gridExperiment({"algorithm:=model_averaging", "personal_init:=keep"});
   EXPECT_EQ(e.settings().personal.lambda, 0);

@@ -1,6 +1,7 @@
 #include "pmeta_core/run/run_log.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -360,7 +361,7 @@ TEST(RunLog, KeepsConfigManifestAndRounds) {
   RunLog log(experiment);
   EXPECT_EQ(log.dir(), dir / "grid/run");
   EXPECT_EQ(namesIn(log.dir()),
-            (std::vector<std::string>{"config.yaml", "manifest.json", "rounds.csv"}));
+            (std::vector<std::string>{"config.yaml", "lock", "manifest.json", "rounds.csv"}));
   EXPECT_EQ(readFile(log.dir() + "/config.yaml"), experiment.yaml());
   EXPECT_EQ(Experiment::load(log.dir() + "/config.yaml").yaml(), experiment.yaml());
   EXPECT_EQ(runStatus(log.dir()), "running");
@@ -379,7 +380,7 @@ TEST(RunLog, KeepsConfigManifestAndRounds) {
   log.finish("stopped");
   EXPECT_EQ(runStatus(log.dir()), "stopped");
   EXPECT_EQ(namesIn(log.dir()),
-            (std::vector<std::string>{"config.yaml", "manifest.json", "rounds.csv"}));
+            (std::vector<std::string>{"config.yaml", "lock", "manifest.json", "rounds.csv"}));
 }
 
 TEST(RunLog, ManifestTellsWhatRan) {
@@ -413,6 +414,34 @@ TEST(RunLog, ManifestTellsWhatRan) {
   EXPECT_EQ(task.at("split"), "train");
   EXPECT_EQ(task.at("name"), "grid_3x3");
   EXPECT_EQ(task.at("description"), "3x3 cells, landmark at row 2, column 2");
+}
+
+TEST(RunLog, AFailureStandsInTheManifestWithItsReason) {
+  const TempDir dir;
+  const Experiment experiment = threeTasks({"results_dir:=" + dir.path()});
+  RunLog log(experiment);
+  log.fail("a reason with a byte \xff that is no text.");
+  const auto manifest = nlohmann::json::parse(readFile(log.dir() + "/manifest.json"));
+  EXPECT_EQ(manifest.at("status"), "failed");
+  EXPECT_EQ(manifest.at("reason"), "a reason with a byte \xEF\xBF\xBD that is no text.");
+  EXPECT_TRUE(manifest.at("ended").is_string());
+  EXPECT_EQ(manifest.at("pid"), ::getpid());
+  EXPECT_EQ(manifest.at("host"), hostName());
+  // nothing to write to: the error that is on its way is not replaced
+  std::filesystem::remove_all(log.dir());
+  log.fail("gone");
+}
+
+TEST(RunLog, TheManifestCountsRoundsWhileTheRunGoesOn) {
+  const TempDir dir;
+  RunLog log(threeTasks({"results_dir:=" + dir.path()}));
+  const auto roundsDone = [&] {
+    return nlohmann::json::parse(readFile(log.dir() + "/manifest.json")).at("rounds_done");
+  };
+  RoundBook::Round round;
+  // at most once a second, so that quick rounds cost nothing
+  for (round.summary.round = 1; roundsDone() == 0; ++round.summary.round) log.write(round);
+  EXPECT_EQ(roundsDone(), round.summary.round - 1);
 }
 
 TEST(RunLog, AnExistingRunIsRefusedAndUntouched) {

@@ -165,15 +165,21 @@ Experiment loadExperiment(const std::string& config, const std::string& resume,
                         : Experiment::resume(resume, arguments.words, config);
 }
 
+// nobody else writes the folder from before the point is looked for
+pmeta::RunLog reopen(const Experiment& experiment, pmeta::ResumePoint& point) {
+  pmeta::requireResumable(experiment.runDir());
+  pmeta::RunLock lock(experiment.runDir());
+  point = pmeta::findResumePoint(experiment);
+  for (const std::string& sentence : point.refused) std::cerr << sentence << "\n";
+  return pmeta::RunLog::reopen(experiment, point.rounds_done, std::move(lock));
+}
+
 int run(Arguments arguments) {
   const std::string config = takeConfig(arguments);
   const std::string resume = takeResume(arguments);
   const Experiment experiment = loadExperiment(config, resume, arguments);
   pmeta::ResumePoint point;
-  if (!resume.empty()) point = pmeta::findResumePoint(experiment);
-  for (const std::string& sentence : point.refused) std::cerr << sentence << "\n";
-  pmeta::RunLog log = resume.empty() ? pmeta::RunLog(experiment)
-                                     : pmeta::RunLog::reopen(experiment, point.rounds_done);
+  pmeta::RunLog log = resume.empty() ? pmeta::RunLog(experiment) : reopen(experiment, point);
   std::cout << "settings\n" << experiment.table() << std::flush;
   printNotes(experiment);
   if (point.round > 0) std::cout << "going on after round " << point.round << std::endl;
@@ -208,16 +214,17 @@ int sweep(Arguments arguments) {
     return 0;
   }
   int found = 0;
+  int elsewhere = 0;
   int done = 0;
   int total = 0;
   const std::string folder =
       pmeta::runSweep(plan, g_stop, [&](const pmeta::SweepProgress& progress) {
         done = progress.done;
         total = progress.total;
-        if (progress.skipped) {
-          ++found;
-          return;
-        }
+        if (!progress.in_use.empty()) std::cerr << "left out: " << progress.in_use << std::endl;
+        if (progress.skipped) ++found;
+        if (!progress.in_use.empty()) ++elsewhere;
+        if (progress.skipped || !progress.in_use.empty()) return;
         std::printf("[%d/%d] %s  PP %s  MP %s  %s  ETA %s\n", progress.done, progress.total,
                     progress.run_id.c_str(), shortNumber(progress.personal_return).c_str(),
                     shortNumber(progress.meta_return).c_str(), duration(progress.seconds).c_str(),
@@ -225,10 +232,14 @@ int sweep(Arguments arguments) {
         std::fflush(stdout);
       });
   if (found > 0) std::cout << found << " runs had been finished before\n";
-  const bool stopped = done < total;
+  if (elsewhere > 0) {
+    std::cerr << elsewhere << " runs were left to whom else writes them: the same command sees to "
+              << "what that leaves" << std::endl;
+  }
+  const bool stopped = done + elsewhere < total;
   std::cout << (stopped ? "stopped; the same command goes on. Runs in " : "runs in ") << folder
             << std::endl;
-  return stopped ? 130 : 0;
+  return stopped ? 130 : (elsewhere > 0 ? 1 : 0);
 }
 
 int check(Arguments arguments) {

@@ -14,6 +14,7 @@
 #include <tuple>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/hash.h"
 #include "pmeta_core/personal/dqn_personal_learner.h"
 #include "pmeta_core/personal/sac_personal_learner.h"
 
@@ -142,13 +143,19 @@ Experiment Experiment::resume(const std::string& run_dir, const std::vector<std:
   return experiment;
 }
 
-std::map<std::string, std::string> Experiment::definingSettings() const {
-  std::map<std::string, std::string> settings = flatSettings(YAML::Load(yaml_));
+std::map<std::string, std::string> Experiment::definingSettings(const std::string& yaml) {
+  std::map<std::string, std::string> settings = flatSettings(parseYaml(yaml, "config.yaml"));
   for (const char* key : {"results_dir", "pace", "publish_trajectories", "key_file",
                           "checkpoint.interval", "aggregation.round_timeout"}) {
     settings.erase(key);
   }
   return settings;
+}
+
+std::string Experiment::settingsHash() const {
+  std::string lines;
+  for (const auto& [key, value] : definingSettings()) lines += key + "=" + value + "\n";
+  return hashText(lines);
 }
 
 std::string firstDifference(const std::map<std::string, std::string>& a,

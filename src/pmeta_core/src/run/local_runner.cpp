@@ -128,10 +128,8 @@ class LocalRun {
   FreshEvaluation fresh_;
 };
 
-}  // namespace
-
-LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound& on_round,
-                       int resumed_round) {
+LocalResult runRounds(const Experiment& experiment, RunLog* log, const OnRound& on_round,
+                      int resumed_round) {
   LocalRun run(experiment);
   if (resumed_round > 0) run.loadCheckpoints(resumed_round);
   const auto save = [&] {
@@ -166,8 +164,20 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
   return result;
 }
 
+}  // namespace
+
+LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound& on_round,
+                       int resumed_round) {
+  try {
+    return runRounds(experiment, log, on_round, resumed_round);
+  } catch (const std::exception& error) {
+    if (log != nullptr) log->fail(error.what());
+    throw;
+  }
+}
+
 ResumePoint findResumePoint(const Experiment& experiment) {
-  requireResumable(experiment.runDir());
+  requireUnfinished(experiment.runDir());
   LocalRun run(experiment);
   ResumePoint point;
   point.round = newestCommonRound(run.folders(), point.refused);

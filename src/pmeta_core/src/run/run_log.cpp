@@ -13,10 +13,15 @@
 #include <nlohmann/json.hpp>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/file.h"
 #include "pmeta_core/base/version.h"
 
 namespace pmeta {
 namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::chrono::seconds kManifestInterval{1};
 
 double meanReturn(const std::vector<RoundRow>& rows, Policy policy, Split split, int context) {
   double sum = 0;
@@ -28,6 +33,61 @@ double meanReturn(const std::vector<RoundRow>& rows, Policy policy, Split split,
     ++n;
   }
   return n == 0 ? std::numeric_limits<double>::quiet_NaN() : sum / n;
+}
+
+// what does not change of manifest.json, with a place for what does
+std::string constantManifest(const Experiment& experiment, const std::string& started) {
+  const ExperimentSettings& e = experiment.settings();
+  Json manifest;
+  manifest["experiment"] = e.experiment;
+  manifest["run_id"] = e.run_id;
+  manifest["algorithm"] = e.algorithm;
+  manifest["seed"] = e.seed;
+  manifest["status"] = nullptr;
+  manifest["reason"] = nullptr;
+  manifest["rounds_done"] = nullptr;
+  manifest["rounds"] = e.rounds;
+  manifest["started"] = started;
+  manifest["ended"] = nullptr;
+  manifest["host"] = hostName();
+  manifest["pid"] = ::getpid();
+  manifest["settings_hash"] = experiment.settingsHash();
+  manifest["commit"] = commit();
+  manifest["versions"] = versions();
+  manifest["tasks"] = Json::array();
+  for (int task = 0; task < experiment.totalTasks(); ++task) {
+    const Split split = experiment.isTestTask(task) ? Split::kTest : Split::kTrain;
+    Json entry = {{"task", task},
+                  {"split", name(split)},
+                  {"name", experiment.family().taskName(task)},
+                  {"description", experiment.family().taskDescription(task)}};
+    if (const auto optimum = experiment.optimalReturn(task)) entry["optimal_return"] = *optimum;
+    manifest["tasks"].push_back(std::move(entry));
+  }
+  return manifest.dump();
+}
+
+// a text of manifest.json; "" if there is none
+std::string manifestText(const std::string& run_dir, const char* key) {
+  const std::string path = run_dir + "/manifest.json";
+  if (!std::filesystem::exists(path)) return "";
+  const auto manifest = Json::parse(readFile(path, "the manifest"), nullptr, false);
+  const bool given = manifest.is_object() && manifest.contains(key) && manifest[key].is_string();
+  return given ? manifest[key].get<std::string>() : "";
+}
+
+std::string manifestStatus(const std::string& run_dir) { return manifestText(run_dir, "status"); }
+
+// the folder of a new run, which no other has
+RunLock takeNew(const Experiment& experiment) {
+  const std::string dir = experiment.runDir();
+  requireWritable(experiment.settings().results_dir);
+  requireWritable(dir);
+  RunLock lock(dir);
+  if (std::filesystem::exists(dir + "/manifest.json")) {
+    throw Error("the run folder " + dir + " already holds a run: choose another run_id.");
+  }
+  return lock;
 }
 
 // the whole lines of rounds 1 to `last`, with the header; `evaluated` is the last that has lines
@@ -235,31 +295,41 @@ void RoundBook::loadState(StateReader& reader) {
   }
 }
 
-RunLog::RunLog(const Experiment& experiment) : RunLog(experiment, utcTime(), 0) {
-  requireWritable(experiment.settings().results_dir);
-  if (std::filesystem::exists(dir_ + "/manifest.json")) {
-    throw Error("the run folder " + dir_ + " already holds a run: choose another run_id.");
+RunLog::RunLog(const Experiment& experiment) : RunLog(create(experiment, takeNew(experiment))) {}
+
+RunLog RunLog::anew(const Experiment& experiment, RunLock lock) {
+  for (const auto& entry : std::filesystem::directory_iterator(experiment.runDir())) {
+    if (entry.path() != lock.path()) std::filesystem::remove_all(entry.path());
   }
-  requireWritable(dir_);
-  writeFileAtomically(dir_ + "/config.yaml", experiment.yaml());
-  writeManifest("running");
-  writeFileAtomically(dir_ + "/rounds.csv", std::string(csvHeader()) + "\n");
-  openCsv();
+  return create(experiment, std::move(lock));
 }
 
-RunLog::RunLog(const Experiment& experiment, const std::string& started, int rounds_done)
-    : experiment_(experiment),
+RunLog::RunLog(const Experiment& experiment, const std::string& started, int rounds_done,
+               RunLock lock)
+    : lock_(std::move(lock)),
       dir_(experiment.runDir()),
-      started_(started),
+      manifest_(constantManifest(experiment, started)),
       rounds_done_(rounds_done) {}
 
+RunLog RunLog::create(const Experiment& experiment, RunLock lock) {
+  RunLog log(experiment, utcTime(), 0, std::move(lock));
+  writeFileAtomically(log.dir_ + "/config.yaml", experiment.yaml());
+  log.writeManifest("running");
+  writeFileAtomically(log.dir_ + "/rounds.csv", std::string(csvHeader()) + "\n");
+  log.openCsv();
+  return log;
+}
+
 RunLog RunLog::reopen(const Experiment& experiment, int rounds_done) {
+  requireResumable(experiment.runDir());
+  return reopen(experiment, rounds_done, RunLock(experiment.runDir()));
+}
+
+RunLog RunLog::reopen(const Experiment& experiment, int rounds_done, RunLock lock) {
   const std::string dir = experiment.runDir();
-  requireResumable(dir);
-  std::ifstream file(dir + "/manifest.json");
-  const auto manifest = nlohmann::json::parse(file, nullptr, false);
-  const bool dated = manifest.contains("started") && manifest["started"].is_string();
-  RunLog log(experiment, dated ? manifest["started"].get<std::string>() : utcTime(), rounds_done);
+  requireUnfinished(dir);
+  const std::string started = manifestText(dir, "started");
+  RunLog log(experiment, started.empty() ? utcTime() : started, rounds_done, std::move(lock));
   requireWritable(dir);
   const EvaluationSchedule evaluations = experiment.evaluationSchedule();
   int evaluated = rounds_done;
@@ -302,9 +372,23 @@ void RunLog::write(const RoundBook::Round& round) {
   }
   csv_size_ += lines.size();
   rounds_done_ = round.summary.round;
+  if (Clock::now() < next_manifest_) return;
+  try {
+    writeManifest("running");
+  } catch (const Error&) {
+    // the round is written: a disk that takes no more is told of when the next one is
+  }
 }
 
 void RunLog::finish(const std::string& status) { writeManifest(status); }
+
+void RunLog::fail(const std::string& reason) noexcept {
+  try {
+    writeManifest("failed", reason);
+  } catch (const std::exception&) {
+    // as where the disk is full: then nobody writes a run that "runs", which runStatus() sees
+  }
+}
 
 const char* RunLog::csvHeader() {
   return "round,task,split,policy,context_episodes,return_mean,return_std,episodes,env_steps,"
@@ -321,45 +405,38 @@ std::string RunLog::csvLine(const RoundRow& row) {
          std::to_string(row.env_steps) + "," + std::to_string(row.updates) + "," + seconds;
 }
 
-void RunLog::writeManifest(const std::string& status) {
-  const ExperimentSettings& e = experiment_.settings();
-  nlohmann::ordered_json manifest;
-  manifest["experiment"] = e.experiment;
-  manifest["run_id"] = e.run_id;
-  manifest["algorithm"] = e.algorithm;
-  manifest["seed"] = e.seed;
+void RunLog::writeManifest(const std::string& status, const std::string& reason) {
+  auto manifest = nlohmann::ordered_json::parse(manifest_);
   manifest["status"] = status;
-  manifest["rounds_done"] = rounds_done_;
-  manifest["rounds"] = e.rounds;
-  manifest["started"] = started_;
-  manifest["ended"] =
-      status == "running" ? nlohmann::ordered_json() : nlohmann::ordered_json(utcTime());
-  manifest["commit"] = commit();
-  manifest["versions"] = versions();
-  manifest["tasks"] = nlohmann::ordered_json::array();
-  for (int task = 0; task < experiment_.totalTasks(); ++task) {
-    const Split split = experiment_.isTestTask(task) ? Split::kTest : Split::kTrain;
-    nlohmann::ordered_json entry = {{"task", task},
-                                    {"split", name(split)},
-                                    {"name", experiment_.family().taskName(task)},
-                                    {"description", experiment_.family().taskDescription(task)}};
-    if (const auto optimum = experiment_.optimalReturn(task)) entry["optimal_return"] = *optimum;
-    manifest["tasks"].push_back(std::move(entry));
+  if (reason.empty()) {
+    manifest.erase("reason");
+  } else {
+    manifest["reason"] = reason;
   }
-  writeFileAtomically(dir_ + "/manifest.json", manifest.dump(2) + "\n");
+  manifest["rounds_done"] = rounds_done_;
+  if (status != "running") manifest["ended"] = utcTime();
+  // a reason may hold anything
+  writeFileAtomically(dir_ + "/manifest.json",
+                      manifest.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  next_manifest_ = Clock::now() + kManifestInterval;
 }
 
 std::string runStatus(const std::string& run_dir) {
-  std::ifstream file(run_dir + "/manifest.json");
-  const auto manifest = nlohmann::json::parse(file, nullptr, false);
-  if (!manifest.is_object() || !manifest.contains("status") || !manifest["status"].is_string()) {
-    return "";
-  }
-  return manifest["status"];
+  const std::string status = manifestStatus(run_dir);
+  return status == "running" && RunLock::holder(run_dir).empty() ? "interrupted" : status;
 }
 
 void requireResumable(const std::string& run_dir) {
-  const std::string status = runStatus(run_dir);
+  const std::string holder = RunLock::holder(run_dir);
+  if (!holder.empty()) {
+    throw Error("the run in " + run_dir + " is going on, in " + holder +
+                ": wait until that has ended, or stop it.");
+  }
+  requireUnfinished(run_dir);
+}
+
+void requireUnfinished(const std::string& run_dir) {
+  const std::string status = manifestStatus(run_dir);
   if (status.empty()) {
     throw Error("there is no run to resume in " + run_dir + ": it has no manifest.json.");
   }

@@ -3,15 +3,16 @@
 #include <chrono>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <regex>
-#include <sstream>
+#include <set>
 #include <thread>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/file.h"
 #include "pmeta_core/run/local_runner.h"
 
 namespace pmeta {
@@ -81,19 +82,11 @@ std::vector<std::vector<std::string>> combinations(const std::vector<Axis>& axes
   return all;
 }
 
-// the settings that decide a run's numbers: all but where it is written, and its checkpoints
-std::string identity(const std::string& yaml) {
-  std::istringstream in(yaml);
-  std::string line;
-  std::string kept;
-  std::string section;
-  while (std::getline(in, line)) {
-    if (!line.empty() && line.front() != ' ') section = line.substr(0, line.find(':'));
-    if (section != "results_dir" && section != "run_id" && section != "checkpoint") {
-      kept += line + "\n";
-    }
-  }
-  return kept;
+// what decides a run's numbers: all but its name
+std::map<std::string, std::string> identity(const std::string& yaml) {
+  std::map<std::string, std::string> settings = Experiment::definingSettings(yaml);
+  settings.erase("run_id");
+  return settings;
 }
 
 // a folder name out of the settings that vary: "algorithm_pmeta-lambda_5-seed_0"
@@ -114,33 +107,51 @@ std::string nameRun(const Experiment& experiment, const std::vector<Axis>& axes)
   return name.empty() ? "run" : name;
 }
 
-// true if a finished run with these settings is there already
-bool findFinished(const Experiment& experiment) {
+// throws Error if there is a run of that name that has other settings
+void requireSameSettings(const Experiment& experiment) {
   const std::string dir = experiment.runDir();
-  if (runStatus(dir) != "finished") return false;
-  std::ifstream file(dir + "/config.yaml");
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (identity(text.str()) != identity(experiment.yaml())) {
-    throw Error("the finished run " + dir +
-                " has other settings: give this sweep another --name, or remove that folder.");
-  }
-  return true;
+  const std::string config = dir + "/config.yaml";
+  if (!std::filesystem::exists(config)) return;
+  const auto found = identity(readFile(config, "the settings file"));
+  const auto expected = identity(experiment.yaml());
+  const std::string key = firstDifference(found, expected);
+  if (key.empty()) return;
+  const auto shown = [&](const std::map<std::string, std::string>& settings) {
+    const auto value = settings.find(key);
+    return value == settings.end() ? std::string("not set") : value->second;
+  };
+  throw Error("the run " + dir + " has other settings, with " + key + " " + shown(found) +
+              " where this sweep has " + shown(expected) +
+              ": give this sweep another --name, or remove that folder.");
 }
 
-// where a run that was cut off goes on; its folder is cleared away if there is no such round
-ResumePoint startOf(const Experiment& experiment, bool resume) {
+bool isFinished(const Experiment& experiment) {
+  return runStatus(experiment.runDir()) == "finished";
+}
+
+struct BegunRun {
+  RunLog log;
+  int round;  // of the checkpoints from which it goes on; 0: it begins anew
+};
+
+// the folder of the run, where it was cut off or cleared; nothing if somebody else has finished it.
+// Throws FolderInUse
+std::optional<BegunRun> beginRun(const Experiment& experiment, bool resume) {
   const std::string dir = experiment.runDir();
+  requireWritable(dir);
+  RunLock lock(dir);
+  requireSameSettings(experiment);
+  if (isFinished(experiment)) return std::nullopt;
+  ResumePoint point;
   if (resume && !runStatus(dir).empty()) {
     try {
-      return findResumePoint(experiment);
+      point = findResumePoint(experiment);
     } catch (const Error&) {
-      // cut off before its first checkpoint, or of other settings
+      // cut off before its first checkpoint
     }
   }
-  std::error_code error;
-  std::filesystem::remove_all(dir, error);
-  return {};
+  if (point.round == 0) return BegunRun{RunLog::anew(experiment, std::move(lock)), 0};
+  return BegunRun{RunLog::reopen(experiment, point.rounds_done, std::move(lock)), point.round};
 }
 
 }  // namespace
@@ -151,10 +162,10 @@ std::vector<Experiment> planSweep(const SweepPlan& plan) {
   }
   const std::vector<Axis> axes = parseAxes(plan.assignments);
   std::vector<Experiment> runs;
-  std::map<std::string, bool> seen;
+  std::set<std::map<std::string, std::string>> seen;
   for (const std::vector<std::string>& assignments : combinations(axes)) {
     const Experiment base = Experiment::load(plan.config, assignments);
-    if (!seen.emplace(identity(base.yaml()), true).second) continue;
+    if (!seen.insert(identity(base.yaml())).second) continue;
     std::vector<std::string> placed = assignments;
     placed.push_back("results_dir:=" + base.settings().results_dir + "/sweeps/" + plan.name);
     placed.push_back("run_id:=" + nameRun(base, axes));
@@ -169,22 +180,28 @@ std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
   const std::vector<Experiment> runs = planSweep(plan);
   const std::string folder = runs.front().settings().results_dir;
   requireWritable(folder);
+  for (const Experiment& run : runs) requireSameSettings(run);
 
   std::vector<const Experiment*> open;
   SweepProgress progress;
   progress.total = static_cast<int>(runs.size());
+  // of one that is not run here: it is finished already, or somebody else writes it
+  const auto leave = [&](const Experiment& run, const std::string& in_use) {
+    SweepProgress left = progress;
+    left.skipped = in_use.empty();
+    if (left.skipped) left.done = ++progress.done;
+    left.in_use = in_use;
+    left.run_id = run.settings().run_id;
+    left.personal_return = left.meta_return = std::numeric_limits<double>::quiet_NaN();
+    on_progress(left);
+  };
   for (const Experiment& run : runs) {
-    if (!findFinished(run)) {
+    if (isFinished(run)) {
+      leave(run, "");
+    } else {
       open.push_back(&run);
-      continue;
     }
-    ++progress.done;
-    progress.skipped = true;
-    progress.run_id = run.settings().run_id;
-    progress.personal_return = progress.meta_return = std::numeric_limits<double>::quiet_NaN();
-    on_progress(progress);
   }
-  progress.skipped = false;
 
   using Clock = std::chrono::steady_clock;
   const auto secondsSince = [](Clock::time_point start) {
@@ -194,27 +211,37 @@ std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
   std::mutex mutex;
   std::atomic<std::size_t> next{0};
   std::atomic<bool> failed{false};
+  double done_here = 0;
   std::exception_ptr failure;
   const auto work = [&] {
     try {
       for (std::size_t i = next++; i < open.size() && !stop && !failed; i = next++) {
         const Clock::time_point start = Clock::now();
-        const ResumePoint point = startOf(*open[i], plan.resume);
-        RunLog log =
-            point.round > 0 ? RunLog::reopen(*open[i], point.rounds_done) : RunLog(*open[i]);
+        std::optional<BegunRun> run;
+        std::string in_use;
+        try {
+          run = beginRun(*open[i], plan.resume);
+        } catch (const FolderInUse& held) {
+          in_use = held.what();
+        }
+        if (!run) {
+          const std::lock_guard<std::mutex> lock(mutex);
+          leave(*open[i], in_use);
+          continue;
+        }
         const LocalResult result = runLocally(
-            *open[i], &log, [&](const RoundBook::Round&) { return !stop; }, point.round);
-        log.finish(result.stopped ? "stopped" : "finished");
+            *open[i], &run->log, [&](const RoundBook::Round&) { return !stop; }, run->round);
+        run->log.finish(result.stopped ? "stopped" : "finished");
         if (result.stopped) return;
         std::error_code error;  // a finished run needs no checkpoints, which are most of its size
-        std::filesystem::remove_all(log.dir() + "/checkpoint", error);
+        std::filesystem::remove_all(run->log.dir() + "/checkpoint", error);
         const std::lock_guard<std::mutex> lock(mutex);
+        ++done_here;
         ++progress.done;
         progress.run_id = open[i]->settings().run_id;
         progress.personal_return = result.rounds.back().summary.personal_return;
         progress.meta_return = result.rounds.back().summary.meta_return;
         progress.seconds = secondsSince(start);
-        const double done_here = progress.done - (runs.size() - open.size());
         progress.eta_seconds = secondsSince(begin) / done_here * (runs.size() - progress.done);
         on_progress(progress);
       }

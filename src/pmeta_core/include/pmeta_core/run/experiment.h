@@ -134,7 +134,11 @@ class Experiment {
   const std::string& table() const { return table_; }
   /// Those of the effective settings that decide what a run learns, by full key: all but
   /// results_dir, checkpoint.*, pace, publish_trajectories and aggregation.round_timeout.
-  std::map<std::string, std::string> definingSettings() const;
+  std::map<std::string, std::string> definingSettings() const { return definingSettings(yaml_); }
+  /// The same of effective settings as YAML, e.g. those of a run folder's config.yaml.
+  static std::map<std::string, std::string> definingSettings(const std::string& yaml);
+  /// A hash of those, as text: parties of one run have the same.
+  std::string settingsHash() const;
   /// All keys with meanings, for --help.
   static std::string describe(const std::string& environment, const std::string& learner);
   /// Notes and warnings about the settings, one sentence each.

@@ -9,6 +9,7 @@
 
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/protocol.h"
+#include "pmeta_core/run/run_lock.h"
 
 namespace pmeta {
 
@@ -81,16 +82,22 @@ class RoundBook {
 };
 
 /// The files of a run: config.yaml, manifest.json and rounds.csv in
-/// <results_dir>/<experiment>/<run_id>.
+/// <results_dir>/<experiment>/<run_id>, which nobody else can write as long as this lives.
 class RunLog {
  public:
   /// Creates the folder; throws Error if it holds a run already or cannot be written.
   explicit RunLog(const Experiment& experiment);
 
+  /// The same for whoever has the folder in hand already: all that is in it is cleared away.
+  static RunLog anew(const Experiment& experiment, RunLock lock);
+
   /// Goes on in the folder of an unfinished run: rounds.csv is cut back to `rounds_done` rounds,
   /// also a line that was cut off, and the manifest says "running" again. Throws Error if the run
-  /// is finished, or its files are not there.
+  /// is finished, its files are not there, or somebody writes it.
   static RunLog reopen(const Experiment& experiment, int rounds_done);
+
+  /// The same for whoever has the folder in hand already.
+  static RunLog reopen(const Experiment& experiment, int rounds_done, RunLock lock);
 
   /// Appends the round's rows and flushes them. Throws Error, e.g. if the disk is full; rounds.csv
   /// is then as it was, and the same round can be tried again.
@@ -99,8 +106,11 @@ class RunLog {
   /// Waits until what has been written is on the disk.
   void sync();
 
-  /// Sets the manifest's status: "finished", "stopped" or "failed".
+  /// Sets the manifest's status: "finished" or "stopped".
   void finish(const std::string& status);
+
+  /// Sets it to "failed" and says why, if the disk takes that: what went wrong comes first.
+  void fail(const std::string& reason) noexcept;
 
   const std::string& dir() const { return dir_; }
 
@@ -108,23 +118,30 @@ class RunLog {
   static std::string csvLine(const RoundRow& row);
 
  private:
-  RunLog(const Experiment& experiment, const std::string& started, int rounds_done);
-  void openCsv();
-  void writeManifest(const std::string& status);
+  using Clock = std::chrono::steady_clock;
 
-  Experiment experiment_;
+  RunLog(const Experiment& experiment, const std::string& started, int rounds_done, RunLock lock);
+  static RunLog create(const Experiment& experiment, RunLock lock);
+  void openCsv();
+  void writeManifest(const std::string& status, const std::string& reason = "");
+
+  RunLock lock_;
   std::string dir_;
-  std::string started_;
+  std::string manifest_;  // what does not change of it, as JSON
   int rounds_done_ = 0;
+  Clock::time_point next_manifest_;  // while the run goes on
   std::ofstream csv_;
   std::uintmax_t csv_size_ = 0;  // of whole rounds
 };
 
-/// Status in a run folder's manifest.json: "running", "finished", "stopped", "failed", or "" if
-/// none.
+/// Status of a run folder: "running", "finished", "stopped", "failed", "interrupted" if its
+/// manifest says that it runs but nobody writes it, or "" if it holds no run.
 std::string runStatus(const std::string& run_dir);
 
 /// Throws Error unless the folder holds a run that is not finished.
+void requireUnfinished(const std::string& run_dir);
+
+/// The same, and that nobody writes.
 void requireResumable(const std::string& run_dir);
 
 /// Writes a whole file under a temporary name, then renames it: never half a file. Throws Error.

@@ -26,8 +26,9 @@ struct SweepProgress {
   int done = 0;  ///< runs finished or found finished
   int total = 0;
   bool skipped = false;  ///< this one was found finished
+  std::string in_use;    ///< this one is left to whom else writes it, as a sentence; or ""
   std::string run_id;
-  double personal_return = 0;  ///< of the run's last round; NaN if skipped
+  double personal_return = 0;  ///< of the run's last round; NaN if it was not run
   double meta_return = 0;
   double seconds = 0;      ///< of this run
   double eta_seconds = 0;  ///< for the rest
@@ -37,10 +38,10 @@ struct SweepProgress {
 /// may fix some) are one run. Throws Error before anything is run.
 std::vector<Experiment> planSweep(const SweepPlan& plan);
 
-/// Runs what is not finished yet, `plan.jobs` at a time. Stops
-/// early, keeping what is finished, when `stop` becomes true. Calls on_progress from one thread at
-/// a time. Returns the folder that holds the runs. Throws Error if a finished run there has other
-/// settings under the same name.
+/// Runs what is not finished yet, `plan.jobs` at a time; what somebody else writes is left alone.
+/// Stops early, keeping what is finished, when `stop` becomes true. Calls on_progress from one
+/// thread at a time. Returns the folder that holds the runs. Throws Error, before anything there is
+/// touched, if a run has other settings under the same name.
 std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
                      const std::function<void(const SweepProgress&)>& on_progress);
 
