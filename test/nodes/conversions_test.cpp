@@ -55,6 +55,15 @@ TEST(Conversions, ModelsKeepEveryBit) {
   }
 }
 
+TEST(Conversions, ModelsThatAreMovedAreNotCopied) {
+  pmeta::AuxiliaryUpdate update = {"run", 4, 9, networkModel(), 2.5};
+  const float* values = update.model.floats().data();
+  pmeta_msgs::AuxiliaryUpdate msg = toMsg(std::move(update));
+  EXPECT_EQ(msg.model.float32_values.data(), values);
+  const pmeta::AuxiliaryUpdate back = fromMsg(std::move(msg));
+  EXPECT_EQ(back.model.floats().data(), values);
+}
+
 TEST(Conversions, MetaPolicyRoundTrip) {
   const pmeta::MetaPolicy meta = {"run", 3, networkModel(), {0, 2}, true, 7, true};
   const pmeta_msgs::MetaPolicy msg = overTheWire(toMsg(meta, 10));

@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "pmeta_core/base/error.h"
 
@@ -66,21 +67,21 @@ pmeta::AuxiliaryUpdate headerOf(const pmeta_msgs::AuxiliaryUpdate& msg) {
 
 }  // namespace
 
-pmeta_msgs::ModelBlob toMsg(const pmeta::Model& model) {
+pmeta_msgs::ModelBlob toMsg(pmeta::Model model) {
   pmeta_msgs::ModelBlob msg;
   msg.layout = model.layout.text();
   msg.layout_hash = model.layout.hash();
-  if (model.layout.precision() == pmeta::Precision::kFloat32) {
-    msg.float32_values = model.floats();
-  } else {
-    msg.float64_values = model.doubles();
-  }
-  msg.present = model.present;
   msg.checksum = model.checksum();
+  if (model.layout.precision() == pmeta::Precision::kFloat32) {
+    msg.float32_values = std::move(model.floats());
+  } else {
+    msg.float64_values = std::move(model.doubles());
+  }
+  msg.present = std::move(model.present);
   return msg;
 }
 
-pmeta::Model fromMsg(const pmeta_msgs::ModelBlob& msg) {
+pmeta::Model fromMsg(pmeta_msgs::ModelBlob msg) {
   pmeta::Model model;
   model.layout = pmeta::ModelLayout::parse(msg.layout);
   if (model.layout.hash() != msg.layout_hash) {
@@ -101,11 +102,11 @@ pmeta::Model fromMsg(const pmeta_msgs::ModelBlob& msg) {
                 " entries for " + std::to_string(sent) + " values.");
   }
   if (is_float) {
-    model.values = msg.float32_values;
+    model.values = std::move(msg.float32_values);
   } else {
-    model.values = msg.float64_values;
+    model.values = std::move(msg.float64_values);
   }
-  model.present = msg.present;
+  model.present = std::move(msg.present);
   if (model.checksum() != msg.checksum) {
     throw Error("a model's checksum does not fit its values: it was damaged on the way.");
   }
@@ -125,25 +126,25 @@ pmeta_msgs::MetaPolicy toMsg(const pmeta::MetaPolicy& meta, int rounds) {
   return msg;
 }
 
-pmeta::MetaPolicy fromMsg(const pmeta_msgs::MetaPolicy& msg) {
+pmeta::MetaPolicy fromMsg(pmeta_msgs::MetaPolicy msg) {
   pmeta::MetaPolicy meta = headerOf(msg);
-  meta.model = fromMsg(msg.model);
+  meta.model = fromMsg(std::move(msg.model));
   return meta;
 }
 
-pmeta_msgs::AuxiliaryUpdate toMsg(const pmeta::AuxiliaryUpdate& update) {
+pmeta_msgs::AuxiliaryUpdate toMsg(pmeta::AuxiliaryUpdate update) {
   pmeta_msgs::AuxiliaryUpdate msg;
   msg.run_id = update.run_id;
   msg.task = static_cast<std::uint32_t>(update.task);
   msg.round = static_cast<std::uint32_t>(update.round);
-  msg.model = toMsg(update.model);
+  msg.model = toMsg(std::move(update.model));
   msg.weight = update.weight;
   return msg;
 }
 
-pmeta::AuxiliaryUpdate fromMsg(const pmeta_msgs::AuxiliaryUpdate& msg) {
+pmeta::AuxiliaryUpdate fromMsg(pmeta_msgs::AuxiliaryUpdate msg) {
   pmeta::AuxiliaryUpdate update = headerOf(msg);
-  update.model = fromMsg(msg.model);
+  update.model = fromMsg(std::move(msg.model));
   return update;
 }
 

@@ -17,16 +17,17 @@ namespace pmeta_nodes {
 
 // The one place where messages and the core's types meet, as pairs. What comes in is checked here
 // for form (hash, sizes, checksum, enumerations) and throws pmeta::Error with one sentence if it is
-// bad; whether it belongs to the run is the core's to judge.
+// bad; whether it belongs to the run is the core's to judge. What holds a model is taken by value:
+// whoever has no more use for it moves it in, and its megabytes are not copied.
 
-pmeta_msgs::ModelBlob toMsg(const pmeta::Model& model);
-pmeta::Model fromMsg(const pmeta_msgs::ModelBlob& msg);
+pmeta_msgs::ModelBlob toMsg(pmeta::Model model);
+pmeta::Model fromMsg(pmeta_msgs::ModelBlob msg);
 
 pmeta_msgs::MetaPolicy toMsg(const pmeta::MetaPolicy& meta, int rounds);
-pmeta::MetaPolicy fromMsg(const pmeta_msgs::MetaPolicy& msg);
+pmeta::MetaPolicy fromMsg(pmeta_msgs::MetaPolicy msg);
 
-pmeta_msgs::AuxiliaryUpdate toMsg(const pmeta::AuxiliaryUpdate& update);
-pmeta::AuxiliaryUpdate fromMsg(const pmeta_msgs::AuxiliaryUpdate& msg);
+pmeta_msgs::AuxiliaryUpdate toMsg(pmeta::AuxiliaryUpdate update);
+pmeta::AuxiliaryUpdate fromMsg(pmeta_msgs::AuxiliaryUpdate msg);
 
 pmeta_msgs::TaskReturn toMsg(const pmeta::TaskReturn& result, const std::string& task_name);
 pmeta::TaskReturn fromMsg(const pmeta_msgs::TaskReturn& msg);

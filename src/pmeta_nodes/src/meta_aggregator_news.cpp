@@ -15,6 +15,7 @@ namespace {
 using pmeta_msgs::RoundSummary;
 
 constexpr auto kAnnounceEvery = std::chrono::seconds(5);
+constexpr auto kHealthEvery = std::chrono::milliseconds(500);
 constexpr char kHeld[] = " The run is held until that is mended.";
 
 std::string timeOfDay(std::time_t time) {
@@ -51,7 +52,9 @@ void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& mes
   reportHealth();
 }
 
+// when the run's state changes and twice a second, not for each message: it writes many words
 void MetaAggregatorNode::reportHealth() {
+  next_health_ = Clock::now() + kHealthEvery;
   const std::uint8_t state = summary_.state;
   const std::lock_guard<std::mutex> lock(health_mutex_);
   health_report_ = {};

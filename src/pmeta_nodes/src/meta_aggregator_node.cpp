@@ -58,8 +58,8 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
   round_pub_ = nh_.advertise<RoundSummary>("round", 8, true);
   auxiliary_sub_ = nh_.subscribe<pmeta_msgs::AuxiliaryUpdate>(
       "auxiliary", queue,
-      boost::function<void(const pmeta_msgs::AuxiliaryUpdate::ConstPtr&)>(
-          [this](const pmeta_msgs::AuxiliaryUpdate::ConstPtr& msg) { mailbox_.push(msg); }),
+      boost::function<void(const pmeta_msgs::AuxiliaryUpdate::Ptr&)>(
+          [this](const pmeta_msgs::AuxiliaryUpdate::Ptr& msg) { mailbox_.push(msg); }),
       ros::VoidConstPtr(), hints);
   returns_sub_ = nh_.subscribe<pmeta_msgs::TaskReturn>(
       "returns", queue,
@@ -198,6 +198,7 @@ void MetaAggregatorNode::runRounds() {
     announcePause();
     closeRoundIfDue();
     announceMissing();
+    if (Clock::now() >= next_health_) reportHealth();
   }
   rounds_over_ = true;
   if (book_.roundsTaken() < rounds) collectCompleteRounds(true);
@@ -220,7 +221,7 @@ void MetaAggregatorNode::runRounds() {
 
 void MetaAggregatorNode::take(const Message& message) {
   try {
-    if (const auto* update = std::get_if<pmeta_msgs::AuxiliaryUpdate::ConstPtr>(&message)) {
+    if (const auto* update = std::get_if<pmeta_msgs::AuxiliaryUpdate::Ptr>(&message)) {
       takeUpdate(**update);
     } else {
       takeReturn(*std::get<pmeta_msgs::TaskReturn::ConstPtr>(message));
@@ -230,40 +231,38 @@ void MetaAggregatorNode::take(const Message& message) {
   }
 }
 
-void MetaAggregatorNode::takeUpdate(const pmeta_msgs::AuxiliaryUpdate& msg) {
+void MetaAggregatorNode::takeUpdate(pmeta_msgs::AuxiliaryUpdate& msg) {
+  const auto task = static_cast<int>(msg.task);
   const std::string forgery = refusals_.judge("an update", authenticate(authenticator_, msg));
   if (!forgery.empty()) return refuse(forgery);
   // a foreign run's blob is not even unpacked
   if (msg.run_id != summary_.run_id) {
     return refuseUpdate(
-        msg, "an update belongs to run '" + msg.run_id + "', not to '" + summary_.run_id + "'.");
+        task, "an update belongs to run '" + msg.run_id + "', not to '" + summary_.run_id + "'.");
   }
   try {
     const auto answer =
-        aggregator_.offer(std::make_shared<const pmeta::AuxiliaryUpdate>(fromMsg(msg)));
+        aggregator_.offer(std::make_shared<const pmeta::AuxiliaryUpdate>(fromMsg(std::move(msg))));
     if (answer.verdict == Verdict::kRefused) return refuse(answer.reason);
   } catch (const pmeta::Error& error) {
-    return refuseUpdate(msg, error.what());
+    return refuseUpdate(task, error.what());
   }
-  reportHealth();
 }
 
 void MetaAggregatorNode::takeReturn(const pmeta_msgs::TaskReturn& msg) {
   const std::string forgery = refusals_.judge("a return", authenticate(authenticator_, msg));
   if (!forgery.empty()) return refuse(forgery);
   refusals_.count(book_.add(fromMsg(msg)) ? "returns booked" : "returns not due");
-  reportHealth();
 }
 
-void MetaAggregatorNode::refuseUpdate(const pmeta_msgs::AuxiliaryUpdate& msg,
-                                      const std::string& reason) {
-  aggregator_.countRefusal(static_cast<int>(msg.task), reason);
+void MetaAggregatorNode::refuseUpdate(int task, const std::string& reason) {
+  aggregator_.countRefusal(task, reason);
   refuse(reason);
 }
 
 void MetaAggregatorNode::refuse(const std::string& reason) {
   ++summary_.refused;
-  if (!refusals_.mayTell()) return reportHealth();
+  if (!refusals_.mayTell()) return;
   const std::string told = "refused: " + reason + refusals_.untold();
   ROS_WARN("%s", told.c_str());
   publishRound(RoundSummary::RUNNING, told);

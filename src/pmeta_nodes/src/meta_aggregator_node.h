@@ -61,8 +61,7 @@ class MetaAggregatorNode {
 
  private:
   using Clock = std::chrono::steady_clock;
-  using Message =
-      std::variant<pmeta_msgs::AuxiliaryUpdate::ConstPtr, pmeta_msgs::TaskReturn::ConstPtr>;
+  using Message = std::variant<pmeta_msgs::AuxiliaryUpdate::Ptr, pmeta_msgs::TaskReturn::ConstPtr>;
 
   /// What a checkpoint holds.
   struct State {
@@ -82,10 +81,10 @@ class MetaAggregatorNode {
   void work();
   void runRounds();
   void take(const Message& message);
-  void takeUpdate(const pmeta_msgs::AuxiliaryUpdate& msg);
+  void takeUpdate(pmeta_msgs::AuxiliaryUpdate& msg);
   void takeReturn(const pmeta_msgs::TaskReturn& msg);
   void refuse(const std::string& reason);
-  void refuseUpdate(const pmeta_msgs::AuxiliaryUpdate& msg, const std::string& reason);
+  void refuseUpdate(int task, const std::string& reason);
   void closeRoundIfDue();
   void collectCompleteRounds(bool force);
   void writeDown();
@@ -147,6 +146,7 @@ class MetaAggregatorNode {
   std::atomic<bool> failed_{false};
   std::mutex health_mutex_;
   HealthReport health_report_;
+  Clock::time_point next_health_;  ///< the worker's: when it reports, if nothing happens before
   std::unique_ptr<Health> health_;
   std::thread worker_;
 };

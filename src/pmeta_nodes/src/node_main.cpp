@@ -1,13 +1,12 @@
 #include "node_main.h"
 
-#include <malloc.h>
-
 #include <atomic>
 #include <csignal>
 #include <cstring>
 #include <iostream>
 #include <memory>
 
+#include "free_memory.h"
 #include "master_watch.h"
 #include "pmeta_core/base/error.h"
 
@@ -16,8 +15,6 @@ namespace {
 
 std::atomic<bool> g_stop{false};
 std::unique_ptr<MasterWatch> g_master;
-
-constexpr int kGivenBack = 1 << 20;  // bytes of a block that the system gets back when it is freed
 
 void onSignal(int) { g_stop = true; }
 
@@ -31,8 +28,7 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
       return 0;
     }
   }
-  // models come and go as messages of megabytes; glibc would come to keep them all
-  mallopt(M_MMAP_THRESHOLD, kGivenBack);
+  boundFreeMemory();
   // our own handlers: the last words of a run are published before ROS goes down
   ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
   std::signal(SIGINT, onSignal);

@@ -3,6 +3,7 @@
 #include <ros/callback_queue.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "conversions.h"
 #include "node_main.h"
@@ -111,7 +112,7 @@ bool TaskAgentNode::isAuthentic(const std::string& kind, pmeta::Authenticity aut
   return false;
 }
 
-void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::ConstPtr& msg) {
+void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::Ptr& msg) {
   if (!isAuthentic("a meta-policy", authenticate(authenticator_, *msg))) return;
   if (msg->run_id != status_.run_id) {
     ROS_WARN_THROTTLE(10, "ignoring a meta-policy of run '%s'; this agent belongs to '%s'.",
@@ -163,7 +164,7 @@ void TaskAgentNode::train() {
       const auto msg = mailbox_.pop(std::chrono::seconds(1));
       if (!msg) continue;
       try {
-        trainFrom(fromMsg(**msg));
+        trainFrom(fromMsg(std::move(**msg)));
       } catch (const pmeta::Error& error) {
         // a meta-policy that does not fit is not trained on; a good one may still come
         ROS_ERROR("%s", error.what());
@@ -220,12 +221,13 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     status_.updates_per_s = static_cast<double>(result->updates) / seconds;
     status_.loss = result->loss;
     status_.distance_to_meta = result->distance;
+    status_.train_s = seconds;
   }
   if (experiment_.checkpointsAfter(round) || meta.checkpoint) saveCheckpoint(round);
   // before the aggregator can end the run, and with it this process
   if (round == rounds) savePersonal();
   if (result->personal) deliver(*result->personal);
-  deliver(result->update);
+  deliver(std::move(result->update));
   if (trajectory_pub_ && result->personal) {
     publishEpisode(agent_.recordPersonal(), round, pmeta::Policy::kPersonal);
   }
@@ -302,8 +304,8 @@ void TaskAgentNode::deliver(const pmeta::TaskReturn& result) {
   next_resend_ = Clock::now() + resend_wait_;
 }
 
-void TaskAgentNode::deliver(const pmeta::AuxiliaryUpdate& update) {
-  pmeta_msgs::AuxiliaryUpdate msg = toMsg(update);
+void TaskAgentNode::deliver(pmeta::AuxiliaryUpdate update) {
+  pmeta_msgs::AuxiliaryUpdate msg = toMsg(std::move(update));
   msg.header.stamp = ros::Time::now();
   sign(authenticator_, msg);
   auxiliary_pub_.publish(msg);

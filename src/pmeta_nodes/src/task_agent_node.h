@@ -48,7 +48,7 @@ class TaskAgentNode {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void onMetaPolicy(const pmeta_msgs::MetaPolicy::ConstPtr& msg);
+  void onMetaPolicy(const pmeta_msgs::MetaPolicy::Ptr& msg);
   void onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg);
   bool isAuthentic(const std::string& kind, pmeta::Authenticity authenticity);
 
@@ -59,7 +59,7 @@ class TaskAgentNode {
   void savePersonal() const;
   void waitForAggregator();
   void deliver(const pmeta::TaskReturn& result);
-  void deliver(const pmeta::AuxiliaryUpdate& update);
+  void deliver(pmeta::AuxiliaryUpdate update);
   void publishEpisode(const pmeta::Episode& episode, int round, pmeta::Policy policy);
   void setState(std::uint8_t state, const std::string& message);
   void publishStatus();
@@ -82,7 +82,7 @@ class TaskAgentNode {
   ros::WallTimer status_timer_;
   ros::WallTimer resend_timer_;
 
-  Mailbox<pmeta_msgs::MetaPolicy::ConstPtr> mailbox_{1};
+  Mailbox<pmeta_msgs::MetaPolicy::Ptr> mailbox_{1};
   std::atomic<bool> stop_{false};
   std::atomic<bool> failed_{false};
   std::atomic<bool> run_ended_{false};
