@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pmeta_core/nn/gemm.h"
+#include "pmeta_core/nn/held_signals.h"
 
 namespace {
 
@@ -52,6 +53,26 @@ TEST(Gemm, NoSignalFromOutsideArrivesWithinOneDnn) {
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS, SIGABRT}) {
     EXPECT_EQ(0, sigismember(&g_during, signal)) << signal;
   }
+}
+
+bool isHeld(int signal) {
+  sigset_t now;
+  pthread_sigmask(SIG_SETMASK, nullptr, &now);
+  return sigismember(&now, signal) == 1;
+}
+
+TEST(HeldSignals, WaitForTheEndOfTheOutermostScope) {
+  ASSERT_FALSE(isHeld(SIGUSR1));
+  {
+    const HeldSignals update;
+    {
+      const HeldSignals product;
+      EXPECT_TRUE(isHeld(SIGUSR1));
+    }
+    EXPECT_TRUE(isHeld(SIGUSR1));
+    EXPECT_FALSE(isHeld(SIGSEGV));
+  }
+  EXPECT_FALSE(isHeld(SIGUSR1));
 }
 
 }  // namespace

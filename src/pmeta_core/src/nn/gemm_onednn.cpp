@@ -1,12 +1,11 @@
 #include <dnnl.h>
 #include <omp.h>
-#include <pthread.h>
-#include <signal.h>
 
 #include <string>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/nn/gemm.h"
+#include "pmeta_core/nn/held_signals.h"
 
 #if DNNL_CPU_RUNTIME != DNNL_RUNTIME_OMP && DNNL_CPU_RUNTIME != DNNL_RUNTIME_SEQ
 #error "pMeta holds oneDNN to one thread through OpenMP; this oneDNN is built for another runtime."
@@ -35,32 +34,6 @@ class OneThread {
   int before_;
 };
 
-// oneDNN's AVX-512 kernels may point the stack register at the heap: a signal's frame would be
-// written over whatever lies there, and a handler cannot prevent it. So none arrives on this thread
-// until the product is done, but for those that the thread raises itself. Costs half a microsecond.
-class SignalsHeld {
- public:
-  SignalsHeld() { pthread_sigmask(SIG_BLOCK, &asynchronous(), &before_); }
-  ~SignalsHeld() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalsHeld(const SignalsHeld&) = delete;
-  SignalsHeld& operator=(const SignalsHeld&) = delete;
-
- private:
-  static const sigset_t& asynchronous() {
-    static const sigset_t kSignals = [] {
-      sigset_t set;
-      sigfillset(&set);
-      for (const int raised : {SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGSEGV, SIGSYS, SIGTRAP}) {
-        sigdelset(&set, raised);
-      }
-      return set;
-    }();
-    return kSignals;
-  }
-
-  sigset_t before_;
-};
-
 }  // namespace
 
 void gemm(Transpose transpose_a, Transpose transpose_b, std::size_t m, std::size_t n, std::size_t k,
@@ -69,7 +42,7 @@ void gemm(Transpose transpose_a, Transpose transpose_b, std::size_t m, std::size
   if (m == 0 || n == 0) return;
   const auto size = [](std::size_t x) { return static_cast<dnnl_dim_t>(x); };
   const OneThread one_thread;
-  const SignalsHeld signals_held;
+  const HeldSignals held_signals;
   const dnnl_status_t status =
       dnnl_sgemm(static_cast<char>(transpose_a), static_cast<char>(transpose_b), size(m), size(n),
                  size(k), alpha, a, size(lda), b, size(ldb), beta, c, size(ldc));

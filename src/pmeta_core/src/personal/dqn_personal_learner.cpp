@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "pmeta_core/nn/held_signals.h"
+
 namespace pmeta {
 
 DqnPersonalLearner::DqnPersonalLearner(
@@ -41,6 +43,8 @@ void DqnPersonalLearner::beginRound(const Model& meta, bool keep_personal) {
 }
 
 UpdateStats DqnPersonalLearner::update(Rng& rng) {
+  // once for all products of the update
+  const HeldSignals held_signals;
   const float* parameters = personal_.floats().data();
   UpdateStats stats;
   stats.env_steps = learner_.collect(parameters, rng);

@@ -4,6 +4,7 @@
 
 #include "pmeta_core/learn/action_values.h"
 #include "pmeta_core/learn/context_adaptation.h"
+#include "pmeta_core/nn/held_signals.h"
 
 namespace pmeta {
 namespace {
@@ -102,6 +103,8 @@ void SacPersonalLearner::beginRound(const Model& meta, bool keep_personal) {
 }
 
 UpdateStats SacPersonalLearner::update(Rng& rng) {
+  // once for all products of the update: there are 80 with the inference network
+  const HeldSignals held_signals;
   const float* parameters = personal_.floats().data();
   UpdateStats stats;
   stats.env_steps =
