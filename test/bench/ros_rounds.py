@@ -34,6 +34,7 @@ HEADER = ("updates  parameters  rounds  training s  round s  ratio  faults  sent
 
 def options(arguments):
     parser = argparse.ArgumentParser(prog="./pmeta bench --ros", description=__doc__,
+                                     usage="%(prog)s [OPTION ...] [key=value ...]",
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--experiment", default="half_cheetah_dir", help="(half_cheetah_dir)")
     parser.add_argument("--preset", default="inference", help="(inference)")
@@ -42,8 +43,11 @@ def options(arguments):
                         help="R, updates a round (20 100 400)")
     parser.add_argument("--hidden", type=int, nargs="+", default=[128, 560],
                         help="units of each of the two hidden layers (128 560)")
-    parser.add_argument("settings", nargs="*", metavar="key=value", help="other settings of the runs")
-    return parser.parse_intermixed_args(arguments)
+    # by their look: behind --hidden 128 they would be taken for a number
+    settings = [word for word in arguments if "=" in word and not word.startswith("-")]
+    chosen = parser.parse_args([word for word in arguments if word not in settings])
+    chosen.settings = settings
+    return chosen
 
 
 class Node:
