@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from run_folders import edit, fails, plot, write_run
+from run_folders import Kept, edit, fails, plot, write_run
 from value_maps_test import write_policy
 import pmeta_action_values as pa
 import pmeta_drawing as pd
@@ -68,12 +68,27 @@ def test_a_map_marks_the_goal_and_the_policys_action(folder):
     goals = pa.goals_of(run)
     assert goals == pytest.approx(np.array([[1, 0], [np.cos(3), np.sin(3)]]))
     _, axes = pd.panels(1, 1)
-    low, high, image = pa.draw_map(axes[0][0], pa.views_of(run)["personal"][1], goals[1])
+    low, high, image = pa.draw_map(axes[0][0], pa.views_of(run)["personal"][1], goals[1:])
     assert (low, high) == pytest.approx((5, 9), abs=1e-5)
     assert np.asarray(image.get_array()).shape == (41, 41)
     star, dot = axes[0][0].lines
     assert (star.get_xdata()[0], star.get_ydata()[0]) == pytest.approx((-1, -np.tan(3)))
     assert (dot.get_xdata()[0], dot.get_ydata()[0]) == pytest.approx((-0.9, 0), abs=1e-6)
+
+
+def test_one_map_for_all_tasks_is_drawn_once(tmp_path, folder):
+    run = load(folder)
+    views = pa.views_of(run)
+    kept = Kept()
+    pa.action_values("not told its task", run, views, kept, "a")
+    views["meta"][1].state = views["meta"][1].state + 1
+    pa.action_values("told its task", run, views, kept, "b")
+    axes, told = ([axis for axis in figure.axes if axis.images] for figure, _ in kept.written)
+    assert (len(axes), len(told)) == (3, 4)
+    [stars] = [line for line in axes[2].lines if line.get_marker() == "*"]
+    assert len(stars.get_xdata()) == 2
+    assert "all tasks" in axes[2].get_xlabel()
+    assert all("action along x" in axis.get_xlabel() for axis in axes)
 
 
 def test_goals_lie_evenly_where_no_angles_are_given(folder):

@@ -102,13 +102,21 @@ def action_values(text, run, views, figures, name):
     figure, axes = panels(len(rows), len(tasks), panel_width=2.7)
     figure.set_figheight(0.9 + 2.9 * len(rows))
     for row, name_of_row in zip(axes, rows):
+        shared = len(tasks) > 1 and are_equal([views[name_of_row][task] for task in tasks])
         for axis, task in zip(row, tasks):
-            low, high, image = draw_map(axis, views[name_of_row][task], goals[task])
+            if shared and task != tasks[0]:
+                axis.set_axis_off()
+                continue
+            shown = goals[tasks] if shared else goals[task:task + 1]
+            low, high, image = draw_map(axis, views[name_of_row][task], shown)
             text_of_map = "%s: %.3g to %.3g" % (ROWS[name_of_row], low, high)
             axis.set_title(text_of_map.replace("-", "−"), loc="left")
+        if shared:
+            row[0].set_xlabel("action along x\none for all tasks")
         row[0].set_ylabel("action along y")
     unknown = "meta" in rows and run.settings.get("sac.task_encoding", "inference") == "inference"
-    for axis, task in zip(axes[-1], tasks):
+    labelled = next(row for row in axes[::-1] if row[-1].axison)
+    for axis, task in zip(labelled, tasks):
         axis.set_xlabel("action along x\n%s" % wrapped_name(run.task_names[task], 22))
     bar = figure.colorbar(image, ax=axes, shrink=0.6, aspect=35, ticks=[])
     bar.set_label("Q(start, action), from each map's lowest to its highest")
@@ -117,14 +125,20 @@ def action_values(text, run, views, figures, name):
     figures.save(figure, name)
 
 
-def draw_map(axis, view, goal):
-    """Colours, the policy's action and the goal's direction; returns (lowest, highest, image)."""
+def are_equal(views):
+    """Is it one map? So it is of a meta-policy that knows nothing of the task yet."""
+    return all(view.policy is views[0].policy and np.array_equal(view.state, views[0].state)
+               for view in views)
+
+
+def draw_map(axis, view, goals):
+    """Colours, the policy's action and ways to goals; returns (lowest, highest, image)."""
     values = view.values()
     low, high = float(values.min()), float(values.max())
     half = (AXIS[1] - AXIS[0]) / 2
     image = axis.imshow(values, origin="lower", extent=(-1 - half, 1 + half) * 2, vmin=low,
                         vmax=high, cmap="viridis")
-    axis.plot(*(goal / np.abs(goal).max()), marker="*", markersize=13, color="white",
+    axis.plot(*(goals / np.abs(goals).max(axis=1, keepdims=True)).T, marker="*", markersize=13, color="white",
               markeredgecolor="black", linestyle="none", clip_on=False,
               label="straight to the goal")
     axis.plot(*view.action(), marker="o", markersize=7, color="white", markeredgecolor="black",

@@ -3,14 +3,16 @@
 import numpy as np
 from matplotlib.ticker import EngFormatter, MaxNLocator
 
-from pmeta_drawing import BLACK, BLUE, ORANGE, RED
+import pmeta_statistics as ps
+from pmeta_drawing import BLACK, MP_COLOR, PP_COLOR, SKY
 
-PP = {"color": RED, "linestyle": "-", "marker": "o"}
-MP = {"color": BLUE, "linestyle": "-", "marker": "s"}
-SPLIT_STYLES = {"train": MP, "test": {"color": ORANGE, "linestyle": "-", "marker": "D"}}
+PP = {"color": PP_COLOR, "linestyle": "-", "marker": "o"}
+MP = {"color": MP_COLOR, "linestyle": "-", "marker": "s"}
+SPLIT_STYLES = {"train": MP, "test": {"color": SKY, "linestyle": "-", "marker": "D"}}
 BEFORE_LINE, BETWEEN_LINES = ":", ("--", "-.", (0, (6, 1.5)), (0, (4, 1, 1, 1, 1, 1)))
 MANY_ROUNDS = 200  # thick lines would hide each other's ups and downs
-RETURN = "return\n(reward per episode, mean over tasks)"
+RETURN = "return per episode, mean over tasks"
+SPREAD = "mean and its 95 % interval"
 
 
 def seeds_text(groups):
@@ -22,13 +24,13 @@ def seeds_text(groups):
 
 
 def over_seeds(what, groups):
-    """"mean ± what over 5 seeds", or of one seed the value itself."""
+    """"what over 5 seeds", or of one seed the value itself."""
     seeds = seeds_text(groups)
     return seeds if seeds == "1 seed" else "%s over %s" % (what, seeds)
 
 
 def draw_curve(axis, group, policy, label, band=True, steps=False, **style):
-    """Mean over seeds, and the sample standard deviation as a band; `steps`: progress_axis."""
+    """Mean over seeds, with the interval of pmeta_statistics as a band; `steps`: progress_axis."""
     curves = group.curves(policy)
     mean = curves.mean(axis=0)
     x = group.env_steps if steps else group.rounds
@@ -36,9 +38,9 @@ def draw_curve(axis, group, policy, label, band=True, steps=False, **style):
     if len(mean) > MANY_ROUNDS:
         style.setdefault("linewidth", 1)
     axis.plot(x, mean, label=label, **style)
-    if band and len(curves) > 1:
-        std = curves.std(axis=0, ddof=1)
-        axis.fill_between(x, mean - std, mean + std, color=style["color"], alpha=0.16, linewidth=0)
+    limits = ps.curve_interval(curves) if band else None
+    if limits is not None:
+        axis.fill_between(x, *limits, color=style["color"], alpha=0.16, linewidth=0)
 
 
 def progress_axis(axis, groups, steps=False):

@@ -19,6 +19,9 @@ from pmeta_files import warn
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#666666"
 PALETTE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
+# personal policies and the meta-policy, as rviz shows them (scene_parts.h); far apart for
+# colour-blind readers, too, and in grey
+PP_COLOR, MP_COLOR = "#D81B60", "#0B4FB3"
 STYLE = {
     "font.size": 10, "axes.titlesize": 10.5, "axes.labelsize": 10, "legend.fontsize": 9.5,
     "xtick.labelsize": 9.5, "ytick.labelsize": 9.5, "axes.grid": True, "grid.linewidth": 0.4,
@@ -42,7 +45,7 @@ class Figures:
 
     def save(self, figure, name):
         """Writes and closes the figure; `name` may lie in a folder below `out`."""
-        make_plain(figure)
+        finish(figure)
         os.makedirs(os.path.dirname(os.path.join(self.out, name)), exist_ok=True)
         for extension in self.formats:
             path = os.path.join(self.out, name + "." + extension)
@@ -74,8 +77,10 @@ def plain(text):
     return re.sub(r"(?<!\\)\$", r"\\$", known)
 
 
-def make_plain(figure):
-    """All texts of a figure; those of ticks come from their formatters, see wrapped_name."""
+def finish(figure):
+    """What all texts of a figure need; those of ticks come from formatters, see wrapped_name."""
+    for axis in figure.axes:
+        axis.yaxis.label.set_multialignment("center")
     for text in figure.findobj(Text):
         if text.get_text() != plain(text.get_text()):
             text.set_text(plain(text.get_text()))
@@ -110,10 +115,15 @@ def headline(figure, text):
     figure.suptitle(text, x=0.01, ha="left", fontsize=11)
 
 
+# a blank after a comma or colon, but not within brackets: coordinates stay together
+BETWEEN = re.compile(r"(?<=[,:]) (?![^(\[]*[)\]])")
+
+
 def wrapped_name(name, width=34):
     """A task's name in short lines, which end between two of its properties, not within one."""
-    parts = re.split("(?<=[,:]) ", name)
-    lines = textwrap.fill(" ".join(part.replace(" ", "\u00a0") for part in parts), width)
+    parts = BETWEEN.split(name)
+    lines = textwrap.fill(" ".join(part.replace(" ", "\u00a0") for part in parts), width,
+                          break_on_hyphens=False, break_long_words=False)
     return plain(lines)
 
 

@@ -6,10 +6,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pmeta_runs as pr
+import pmeta_statistics as ps
 import pmeta_tables as pt
-from pmeta_curves import (MP, PP, RETURN, adaptation_curves, draw_curve, draw_optimum, over_seeds,
+from pmeta_curves import (MP, PP, RETURN, SPREAD, adaptation_curves, draw_curve, draw_optimum, over_seeds,
                           progress_axis, seeds_text)
-from pmeta_drawing import (BLUE, GREEN, GREY, PALETTE, PURPLE, RED, SKY, folder_for, headline,
+from pmeta_drawing import (GREEN, GREY, MP_COLOR, ORANGE, PALETTE, PP_COLOR, PURPLE, folder_for, headline,
                            legend_right, panels, row_height, spread_ticks, wrapped_name)
 from pmeta_files import SNAPSHOTS
 
@@ -17,15 +18,15 @@ BASELINES = {  # algorithm: (the policy it is judged by, label, style)
     "model_averaging": ("meta", "MP, model averaging",
                         {"color": GREEN, "linestyle": "--", "marker": "^"}),
     "independent": ("personal", "PP, independent",
-                    {"color": PURPLE, "linestyle": "-.", "marker": "D"}),
-    "pooled": ("personal", "PP, pooled", {"color": SKY, "linestyle": (0, (5, 1)), "marker": "v"}),
+                    {"color": ORANGE, "linestyle": "-.", "marker": "D"}),
+    "pooled": ("personal", "PP, pooled", {"color": PURPLE, "linestyle": (0, (5, 1)), "marker": "v"}),
 }
 MAX_PANELS = 3
 MAX_SLICES = 4
 MAX_TASK_GROUPS = 6
 TASK_STYLES = {  # label, colour, marker
-    "personal": ("PP, own task", RED, "o"),
-    "meta": ("MP", BLUE, "s"),
+    "personal": ("PP, own task", PP_COLOR, "o"),
+    "meta": ("MP", MP_COLOR, "s"),
     "all": ("all personal policies\non the task, mean", GREY, "D"),
 }
 
@@ -67,7 +68,7 @@ def learning_curves(experiment, groups, figures, prefix):
         progress_axis(axes[0][0], drawn, steps)
     axes[0][0].set_ylabel(RETURN)
     legend_right(axes[0])
-    headline(figure, "%s: %s" % (experiment, over_seeds("mean ± standard deviation", drawn)))
+    headline(figure, "%s: %s" % (experiment, over_seeds(SPREAD, drawn)))
     figures.save(figure, prefix + "learning_curves")
 
 
@@ -122,7 +123,7 @@ def setting_curves(experiment, key, members, groups, figures, name):
             color = (plt.get_cmap("viridis")(0.87 * i / (len(members) - 1)) if numeric
                      else PALETTE[i % len(PALETTE)])
             draw_curve(axis, group, policy, pr.setting_text(key, group.settings.get(key)),
-                       band=False, steps=steps, color=color, marker="osD^vP*X"[i % 8])
+                       steps=steps, color=color, marker="osD^vP*X"[i % 8])
         if baseline is not None:
             draw_curve(axis, baseline, "meta", "MP, model averaging", band=False, steps=steps,
                        color=GREY, linestyle="--", linewidth=1.4)
@@ -133,7 +134,7 @@ def setting_curves(experiment, key, members, groups, figures, name):
     legend_right(axes[0])
     fixed = pr.fixed_texts(members[0], pr.pmeta_only(groups), key)
     headline(figure, "%s: %s, %s" % (experiment, " ".join(["pMeta-RL"] + fixed),
-                                     over_seeds("mean", members)))
+                                     over_seeds(SPREAD, members)))
     figures.save(figure, name)
 
 
@@ -147,9 +148,11 @@ def _wrapped(texts):
     return textwrap.fill(" ".join(texts), 38)
 
 
-def mean_and_error(values):
-    """Mean and standard error over seeds; the error of one seed is 0 wide, not known."""
-    return values.mean(), values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0
+def mean_and_limits(values):
+    """Mean over seeds and its interval, which of one seed is no wider than the mean."""
+    mean = values.mean()
+    limits = ps.curve_interval(values[:, None])
+    return (mean, mean, mean) if limits is None else (mean, limits[0][0], limits[1][0])
 
 
 def sweep_figure(experiment, key, found, groups, figures, name):
@@ -165,7 +168,7 @@ def sweep_figure(experiment, key, found, groups, figures, name):
         row[0].set_ylabel(RETURN)
     legend_right(axes[0])
     drawn = [group for members in found for group in members]
-    headline(figure, "%s: %s" % (experiment, over_seeds("mean ± standard error", drawn)))
+    headline(figure, "%s: %s" % (experiment, over_seeds(SPREAD, drawn)))
     figures.save(figure, name)
 
 
@@ -179,10 +182,10 @@ def draw_sweep(axis, key, members, measure, groups):
     baselines = [averaging_of(group, groups) for group in members]
     known = [b for b in baselines if b is not None]
     if known and all(b is known[0] for b in baselines):
-        mean, error = mean_and_error(getattr(known[0], measure)("meta"))
+        mean, low, high = mean_and_limits(getattr(known[0], measure)("meta"))
         axis.axhline(mean, color=GREEN, linestyle="--", linewidth=1.4,
                      label="MP, model averaging")
-        axis.axhspan(mean - error, mean + error, color=GREEN, alpha=0.16, linewidth=0)
+        axis.axhspan(low, high, color=GREEN, alpha=0.16, linewidth=0)
     elif known:
         draw_points(axis, [v for v, b in zip(values, baselines) if b is not None], known, measure,
                     *BASELINES["model_averaging"])
@@ -194,9 +197,12 @@ def draw_sweep(axis, key, members, measure, groups):
 
 
 def draw_points(axis, values, members, measure, policy, label, style):
-    points = [mean_and_error(getattr(group, measure)(policy)) for group in members]
-    axis.errorbar(values, [p[0] for p in points], yerr=[p[1] for p in points], label=label,
-                  capsize=2.5, elinewidth=1.2, **style)
+    mean, low, high = np.transpose([mean_and_limits(getattr(group, measure)(policy))
+                                    for group in members])
+    # of equal returns the mean may lie beyond them by its rounding
+    bars = np.maximum(0, (mean - low, high - mean))
+    axis.errorbar(values, mean, yerr=bars, label=label, capsize=2.5,
+                  elinewidth=1.2, **style)
 
 
 def task_figure(experiment, groups, figures, prefix):

@@ -8,7 +8,7 @@ import urllib.parse
 
 import matplotlib.pyplot as plt
 
-from pmeta_drawing import Figures, make_plain
+from pmeta_drawing import Figures, finish
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --soft: #57606a; --line: #d0d7de;
@@ -88,7 +88,7 @@ class InlineFigures(Figures):
         super().__init__("", ())
 
     def save(self, figure, name):
-        make_plain(figure)
+        finish(figure)
         data = io.BytesIO()
         # no date and no random names inside: the same runs give the same bytes
         with plt.rc_context({"svg.hashsalt": "pmeta"}):

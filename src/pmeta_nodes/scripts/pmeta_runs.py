@@ -222,7 +222,9 @@ def _finished_manifest(folder):
 def _task_names(manifest, count):
     """What tells each task from the others, from their descriptions: "zeta 3", …"""
     tasks = manifest.get("tasks")
-    known = {task.get("task"): shown(str(task.get("description") or ""), 200).split(", ")
+    # a comma within brackets is one of coordinates
+    known = {task.get("task"): re.split(r", (?![^(\[]*[)\]])",
+                                        shown(str(task.get("description") or ""), 200))
              for task in (tasks if isinstance(tasks, list) else [])
              if isinstance(task, dict) and isinstance(task.get("task"), int)}
     parts = [known.get(task, [""]) for task in range(count)]

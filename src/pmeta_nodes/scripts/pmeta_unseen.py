@@ -6,7 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pmeta_runs as pr
-from pmeta_curves import (RETURN, draw_curve, meta_label, meta_style, over_seeds, progress_axis)
+from pmeta_curves import (RETURN, SPREAD, draw_curve, meta_label, meta_style, over_seeds,
+                          progress_axis)
 from pmeta_drawing import folder_for, headline, legend_right, row_height, wrapped_name
 
 MAX_GROUPS = 3
@@ -46,7 +47,7 @@ def unseen_tasks(experiment, groups, figures, prefix):
     legend_right(list(axes.flat) + [axes[0][1]])
     many = max(len(group.runs) for group in shown) > 1
     headline(figure, "%s, meta-policy: %s%s" % (
-        experiment, over_seeds("mean ± standard deviation", shown),
+        experiment, over_seeds(SPREAD, shown),
         "; task by task every seed (small) and the mean (large)" if many else ""))
     figures.save(figure, prefix + experiment + "_unseen_tasks")
 
