@@ -73,6 +73,20 @@ def rounds_written(folder):
     return len(file.read_text().splitlines()) // 10 if file.exists() else 0
 
 
+@pytest.mark.parametrize("node, end", [
+    ("task_agent", signal.SIGINT), ("meta_aggregator", signal.SIGTERM),
+    ("trajectory_view", signal.SIGTERM), ("policy_node", signal.SIGINT),
+    ("run_guard", signal.SIGINT)])
+def test_a_node_that_waits_for_a_master_says_so_and_ends_at_once_when_told(tmp_path, node, end):
+    env = environment(tmp_path)
+    log = tmp_path / "log"
+    with process([TOP / "devel/lib/pmeta_nodes" / node], log, env) as waiting:
+        assert wait_until(lambda: "waiting for the ROS master" in log.read_text())
+        assert env["ROS_MASTER_URI"] in log.read_text()
+        os.kill(waiting.pid, end)
+        assert waiting.wait(timeout=20) == -end
+
+
 @pytest.mark.parametrize("restarted", [False, True])
 def test_nodes_stop_and_say_so_when_the_master_is_gone(tmp_path, restarted):
     env = environment(tmp_path)

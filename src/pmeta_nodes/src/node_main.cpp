@@ -1,5 +1,7 @@
 #include "node_main.h"
 
+#include <ros/master.h>
+
 #include <atomic>
 #include <csignal>
 #include <cstring>
@@ -16,9 +18,21 @@ namespace {
 std::atomic<bool> g_stop{false};
 std::unique_ptr<MasterWatch> g_master;
 
+constexpr double kAskAgain = 0.2;  // seconds between two attempts at the master
+
 void onSignal(int) { g_stop = true; }
 
 }  // namespace
+
+void initNode(int argc, char** argv, const std::string& name, std::uint32_t options) {
+  ros::init(argc, argv, name, options);
+  // a script's background process has it ignored
+  std::signal(SIGINT, SIG_DFL);
+  if (ros::master::check()) return;
+  ROS_WARN("waiting for the ROS master at %s; start one with roscore.",
+           ros::master::getURI().c_str());
+  while (!ros::master::check()) ros::WallDuration(kAskAgain).sleep();
+}
 
 int runNode(int argc, char** argv, const std::string& name, const std::string& help,
             const std::function<int(const pmeta::Experiment&)>& body) {
@@ -29,12 +43,12 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
     }
   }
   boundFreeMemory();
-  // our own handlers: the last words of a run are published before ROS goes down
-  ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
-  std::signal(SIGINT, onSignal);
-  std::signal(SIGTERM, onSignal);
+  initNode(argc, argv, name, ros::init_options::NoSigintHandler);
   // outside the try: the console falls silent when the last node handle goes
   const ros::NodeHandle nh;
+  // our own handlers: the last words of a run are published before ROS goes down
+  std::signal(SIGINT, onSignal);
+  std::signal(SIGTERM, onSignal);
   try {
     const pmeta::Experiment experiment = readExperiment(nh, ros::NodeHandle("~"));
     g_master = std::make_unique<MasterWatch>();

@@ -9,6 +9,10 @@
 
 namespace pmeta_nodes {
 
+/// ros::init(), then waits until the master answers and says so. roscpp would wait for it for ever,
+/// whatever signals come; here SIGINT and SIGTERM end the process at once until there is one.
+void initNode(int argc, char** argv, const std::string& name, std::uint32_t options = 0);
+
 /// What every node's main() does: answers --help, sets up ROS with a clean stop on SIGINT and
 /// SIGTERM, reads the experiment, calls `body`, and turns an exception into one sentence and exit
 /// code 1. `body` returns the exit code and is expected to come back soon once stopRequested().

@@ -2,6 +2,7 @@
 #include <cstring>
 #include <iostream>
 
+#include "node_main.h"
 #include "pmeta_core/base/error.h"
 #include "policy_node.h"
 
@@ -43,7 +44,7 @@ int main(int argc, char** argv) {
       return 0;
     }
   }
-  ros::init(argc, argv, "policy_node");
+  pmeta_nodes::initNode(argc, argv, "policy_node");
   std::signal(SIGTERM, onSignal);
   // outside the try: the console falls silent when the last node handle goes
   const ros::NodeHandle nh;
