@@ -482,9 +482,13 @@ def test_the_installed_packages_work_like_the_source_tree(tmp_path):
 
 def test_every_program_answers_help(tmp_path):
     env = environment(tmp_path)
-    for program in ("task_agent", "meta_aggregator", "trajectory_view", "prepare_run"):
-        result = run(["rosrun", "pmeta_nodes", program, "--help"], env=env, timeout=20)
-        assert result.returncode == 0 and program in result.stdout
+    scripts = [path.name for path in (TOP / "src/pmeta_nodes/scripts").glob("[!p]*.py")
+               if path.name != "results.py"]  # is not installed
+    for program in ["task_agent", "meta_aggregator", "trajectory_view", "prepare_run", "run_guard",
+                    "policy_node", "plot.py"] + scripts:
+        result = run([TOP / "devel/lib/pmeta_nodes" / program, "--help"], env=env)
+        assert result.returncode == 0, program + ": " + result.stderr
+        assert program.split(".")[0].split("_")[0] in result.stdout
     assert run([LOCAL, "--help"]).stdout.startswith("usage: pmeta_local")
     assert run([TOP / "pmeta", "--help"]).stdout.startswith("usage: ./pmeta")
     unknown = run([TOP / "pmeta", "dmeo"])

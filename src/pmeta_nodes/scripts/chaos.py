@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Runs an experiment twice, undisturbed and while its nodes are killed and its messages harmed, and
 says whether anything was lost: ./pmeta chaos.
 
@@ -20,6 +20,8 @@ import tempfile
 import time
 import xmlrpc.client
 
+# catkin's relay runs this file from another folder
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from pmeta_files import PlotError as ChaosError
 from pmeta_program import Parser, run_program
 
