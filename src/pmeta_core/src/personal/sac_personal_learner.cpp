@@ -103,7 +103,7 @@ void SacPersonalLearner::beginRound(const Model& meta, bool keep_personal) {
 }
 
 UpdateStats SacPersonalLearner::update(Rng& rng) {
-  // once for all products of the update: there are 80 with the inference network
+  // once for all products of the update: there are 70 with the inference network
   const HeldSignals held_signals;
   const float* parameters = personal_.floats().data();
   UpdateStats stats;
