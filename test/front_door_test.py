@@ -68,6 +68,10 @@ BAD_WORDS = [
      "unknown target 'yaml'; known are: checkpoint csv layout message policy replay settings."),
     (["fuzz", "csv", "--seconds"], "--seconds needs a whole number, at least 1."),
     (["fuzz", "csv", "--seconds", "1m"], "--seconds needs a whole number, at least 1."),
+    (["key"], "which file? See ./pmeta key --help."),
+    (["replay", "cartpole"], "which kind and file? See ./pmeta replay --help."),
+    (["build", "all"], "'all' is too much: see ./pmeta build --help."),
+    (["convergence", "x"], "'x' is not an assignment: write key:=value."),
     (["test", "--msan"], "unknown option '--msan' of test: see ./pmeta test --help."),
 ]
 

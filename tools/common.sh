@@ -11,6 +11,17 @@ die() {
   exit 1
 }
 
+# argument: command, then its words, of which it takes none
+takes_no_words() { [ $# = 1 ] || die "'$2' is too much: see ./pmeta $1 --help."; }
+
+# each of the words must be key:=value
+require_assignments() {
+  local word
+  for word in "$@"; do
+    [[ $word == ?*:=* ]] || die "'$word' is not an assignment: write key:=value."
+  done
+}
+
 # the settings file of an experiment, which is a name of config/ or a file of the user's own
 config_of() {
   local file=$TOP/config/$1.yaml

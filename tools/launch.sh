@@ -3,7 +3,7 @@
 # Builds, checks an experiment's key:=value assignments, and sets LAUNCH (what roslaunch is called
 # with), RUN_DIR and AGENTS (how many).
 prepare_launch() {
-  local experiment=$1 config file=$1.launch word checked
+  local experiment=$1 config file=$1.launch checked
   shift
   config=$(config_of "$experiment")
   LAUNCH=()
@@ -12,9 +12,7 @@ prepare_launch() {
     LAUNCH=("config:=$config")
   fi
   [ -f "$TOP/launch/$file" ] || die "$experiment has no launch file in launch/."
-  for word in "$@"; do
-    [[ $word == ?*:=* ]] || die "'$word' is not an assignment: write key:=value."
-  done
+  require_assignments "$@"
   ensure_built
 
   # what is wrong is told here, in a sentence, before anything starts

@@ -6,4 +6,7 @@
 #
 # Example: JOBS=4 ./pmeta build
 
-command_main() { build; }
+command_main() {
+  takes_no_words build "$@"
+  build
+}

@@ -5,6 +5,7 @@
 # Example: ./pmeta convergence seed:=1
 
 command_main() {
+  require_assignments "$@"
   ensure_built
   pmeta_local convergence "$(config_of convergence)" "$@"
 }

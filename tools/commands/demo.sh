@@ -8,6 +8,7 @@
 # Example: ./pmeta demo
 
 command_main() {
+  takes_no_words demo "$@"
   local stamp results
   stamp=$(date -u +%Y%m%dT%H%M%S)
   results=${ROS_HOME:-$HOME/.ros}/pmeta/demo_$stamp

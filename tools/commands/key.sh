@@ -7,6 +7,7 @@
 # Example: ./pmeta key ~/run.key
 
 command_main() {
+  [ $# = 1 ] || die "which file? See ./pmeta key --help."
   ensure_built
   pmeta_local key "$@"
 }

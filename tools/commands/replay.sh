@@ -9,6 +9,7 @@
 # Example: ./pmeta replay cartpole test/data/cartpole.csv
 
 command_main() {
+  [ $# -ge 2 ] || die "which kind and file? See ./pmeta replay --help."
   ensure_built
   pmeta_local replay "$@"
 }

@@ -6,4 +6,7 @@
 #
 # Example: ./pmeta setup
 
-command_main() { setup; }
+command_main() {
+  takes_no_words setup "$@"
+  setup
+}
