@@ -97,10 +97,19 @@ def test_from_a_plan_to_a_page(folder, tmp_path):
     assert "page.md: tables and data differ" in refuses(folder, "--check")
 
     # data of another command than the plan's
-    edit(str(folder), "plan.yaml", lambda t: t.replace("seed:=0-1 rounds:=3", "seed:=0-2 rounds:=3"))
+    edit(str(folder), "plan.yaml", lambda t: t.replace("seed:=0-1", "seed:=0-2"))
     assert "out of date" in results(folder, *runs, "--status")
     # the same runs, from elsewhere, and one more is missing
     assert "4 of 6 runs have finished" in results(folder, "--import", tmp_path / "runs")
+
+
+@pytest.mark.skipif(not os.path.isfile(str(LOCAL)), reason="needs pmeta_local")
+def test_it_stops_after_the_given_time_and_goes_on(folder, tmp_path):
+    edit(str(folder), "plan.yaml", lambda t: t.replace("rounds:=3", "rounds:=200", 1))
+    run = ("--results-dir", tmp_path / "runs", "--run", "--only", "first", "--jobs", "1")
+    assert "stopped; the same command goes on" in results(folder, *run, "--hours", "1e-9")
+    assert not (folder / "data").exists()
+    assert "packed 4 runs" in results(folder, *run)
 
 
 def test_packed_runs_are_those_that_were_packed(tmp_path):
@@ -148,7 +157,7 @@ def test_verdicts_follow_from_the_numbers():
     (lambda t: t.replace("priority: 1, ", ""), "sweeps, entry 1 must have exactly"),
     (lambda t: t.replace("priority: 1", "priority: soon"), "priority must be of type int"),
     (lambda t: t.replace(" seed:=2", ""), "sweep 'second' have no seed:="),
-    (lambda t: t.replace("policy: mp, measure: last", "policy: me, measure: last"), "policy is 'me'"),
+    (lambda t: t.replace("policy: mp, measure", "policy: me, measure"), "policy is 'me'"),
     (lambda t: t.replace("measure: auc", "measure: length"), "measure is 'length'"),
     (lambda t: t.replace("sweep: first, algorithm: pmeta}, policy: mp, measure",
                          "sweep: third}, policy: mp, measure"), "has no sweep 'third'"),
@@ -160,7 +169,7 @@ def test_a_plan_that_does_not_hold_is_refused(folder, change, words):
 
 
 @pytest.mark.parametrize("change, words", [
-    (lambda t: t.replace("generated: summary", "generated: praise"), "'praise' is none of the blocks"),
+    (lambda t: t.replace("generated: summary", "generated: praise"), "'praise' is none of the"),
     (lambda t: t.replace("<!-- end -->", "", 8), "has a block without <!-- end -->"),
     (lambda t: t.replace("figure first learning", "figure first burning"), "no figures burning"),
     (lambda t: t.replace("learning first", "learning third"), "has no sweep 'third'"),

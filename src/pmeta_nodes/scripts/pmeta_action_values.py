@@ -138,8 +138,8 @@ def draw_map(axis, view, goals):
     half = (AXIS[1] - AXIS[0]) / 2
     image = axis.imshow(values, origin="lower", extent=(-1 - half, 1 + half) * 2, vmin=low,
                         vmax=high, cmap="viridis")
-    axis.plot(*(goals / np.abs(goals).max(axis=1, keepdims=True)).T, marker="*", markersize=13, color="white",
-              markeredgecolor="black", linestyle="none", clip_on=False,
+    axis.plot(*(goals / np.abs(goals).max(axis=1, keepdims=True)).T, marker="*", markersize=13,
+              color="white", markeredgecolor="black", linestyle="none", clip_on=False,
               label="straight to the goal")
     axis.plot(*view.action(), marker="o", markersize=7, color="white", markeredgecolor="black",
               linestyle="none", label="the policy's action")

@@ -8,10 +8,10 @@ import numpy as np
 import pmeta_runs as pr
 import pmeta_statistics as ps
 import pmeta_tables as pt
-from pmeta_curves import (MP, PP, RETURN, SPREAD, adaptation_curves, draw_curve, draw_optimum, over_seeds,
-                          progress_axis, seeds_text)
-from pmeta_drawing import (GREEN, GREY, MP_COLOR, ORANGE, PALETTE, PP_COLOR, PURPLE, folder_for, headline,
-                           legend_right, panels, row_height, spread_ticks, wrapped_name)
+from pmeta_curves import (MP, PP, RETURN, SPREAD, adaptation_curves, draw_curve, draw_optimum,
+                          over_seeds, progress_axis, seeds_text)
+from pmeta_drawing import (GREEN, GREY, MP_COLOR, ORANGE, PALETTE, PP_COLOR, PURPLE, folder_for,
+                           headline, legend_right, panels, row_height, spread_ticks, wrapped_name)
 from pmeta_files import SNAPSHOTS
 
 BASELINES = {  # algorithm: (the policy it is judged by, label, style)
@@ -19,7 +19,8 @@ BASELINES = {  # algorithm: (the policy it is judged by, label, style)
                         {"color": GREEN, "linestyle": "--", "marker": "^"}),
     "independent": ("personal", "PP, independent",
                     {"color": ORANGE, "linestyle": "-.", "marker": "D"}),
-    "pooled": ("personal", "PP, pooled", {"color": PURPLE, "linestyle": (0, (5, 1)), "marker": "v"}),
+    "pooled": ("personal", "PP, pooled",
+               {"color": PURPLE, "linestyle": (0, (5, 1)), "marker": "v"}),
 }
 MAX_PANELS = 3
 MAX_SLICES = 4

@@ -238,7 +238,8 @@ def read_yaml(path):
         mark = getattr(error, "problem_mark", None)
         line = " line %d" % (mark.line + 1) if mark else ""
         problem = getattr(error, "problem", None)
-        raise PlotError("%s%s is not valid YAML%s." % (path, line, problem and ": " + problem or ""))
+        raise PlotError("%s%s is not valid YAML%s."
+                        % (path, line, ": " + problem if problem else ""))
     except RecursionError:
         raise PlotError("%s is nested too deeply to be read." % path)
     if not isinstance(data, dict):

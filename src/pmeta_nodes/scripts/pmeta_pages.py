@@ -197,8 +197,8 @@ def summary_block(data):
                       pt.plus_minus(float(means.mean()), std),
                       pc.with_interval(float(ps.interquartile_mean(scores)), ps.interval(scores)),
                       str(len(means)), verdict(float(means.mean()), limits, aim["number"])))
-    return markdown(("aim", "number from", "sweep", "commit", "number", "ours", "ours, IQM", "seeds",
-                     "verdict"), lines, 4)
+    return markdown(("aim", "number from", "sweep", "commit", "number", "ours", "ours, IQM",
+                     "seeds", "verdict"), lines, 4)
 
 
 def claims_block(data):

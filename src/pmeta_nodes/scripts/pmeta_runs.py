@@ -91,7 +91,8 @@ class Run:
         self.experiment = str(_required(folder, manifest, "experiment", str))
         self.algorithm = str(_required(folder, manifest, "algorithm", str))
         # figures lie in folders of that name
-        if not re.fullmatch(r"[\w.+-]*\w[\w.+-]*", self.experiment) or len(self.experiment) > 100:
+        if (not re.fullmatch(r"[\w.+-]*\w[\w.+-]*", self.experiment)
+                or len(self.experiment) > 100):
             raise PlotError("%s/manifest.json: experiment is '%s' but must be a plain name."
                             % (folder, shown(self.experiment)))
         self.seed = _required(folder, manifest, "seed", int)
@@ -108,8 +109,8 @@ class Run:
         # those that evaluated: every k-th and the last
         interval = self.settings.get("evaluation_interval", 1)
         if not isinstance(interval, int) or interval < 1:
-            raise PlotError("%s/config.yaml: evaluation_interval is '%s' but must be a whole number "
-                            "above 0." % (folder, shown(str(interval))))
+            raise PlotError("%s/config.yaml: evaluation_interval is '%s' but must be a whole "
+                            "number above 0." % (folder, shown(str(interval))))
         self.rounds = np.array([r for r in range(1, self.num_rounds + 1)
                                 if r % interval == 0 or r == self.num_rounds])
         self.curves = with_stand_ins({key: self._curve(path, key, by_round)

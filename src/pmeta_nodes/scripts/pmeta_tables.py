@@ -185,8 +185,8 @@ def legend_lines(rows):
         lines += ["all: every personal policy on every task, mean over all pairs (the paper's DQN;",
                   "its DQN* is the PP of independent)."]
     if any(row["as_paper"] for row in rows):
-        lines += ["paper, λ and paper, best: its table by λ and its table of best returns, beside",
-                  "runs with its networks, batch and number of updates, whatever their other settings."]
+        lines += ["paper, λ and paper, best: its table by λ and its table of best returns, beside runs",
+                  "with its networks, batch and number of updates, whatever their other settings."]
     return lines + pc.LEGEND + ["-: not run."]
 
 

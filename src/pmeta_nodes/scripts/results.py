@@ -16,7 +16,8 @@ from pmeta_program import Parser, run_program
 
 TOP = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), *[".."] * 3))
 LOCAL = os.path.join(TOP, "devel", "lib", "pmeta_core", "pmeta_local")
-STOPPED = 130
+# after the round, or at once: on a second Ctrl-C, or one before it was ready for it
+STOPPED = (130, -signal.SIGINT)
 
 
 def parse_arguments(arguments):
@@ -114,7 +115,7 @@ def run_missing(plan, options):
             flush=True)
         words = sweep_words(sweep, options.results_dir) + ["--resume", "--jobs", str(options.jobs)]
         code = run_until(words, end)
-        if code == STOPPED:
+        if code in STOPPED:
             print("stopped; the same command goes on")
             return
         if code != 0:
