@@ -7,6 +7,7 @@
 #include <random>
 
 #include "../support.h"
+#include "pmeta_core/base/format.h"
 
 namespace pmeta {
 namespace {
@@ -276,7 +277,7 @@ TEST(Settings, NumbersMustBePlainFiniteAndDecimal) {
                                                     : text;
     EXPECT_EQ(
         readError("personal: {lambda: '" + value + "'}"),
-        "personal.lambda is '" + value + "' (a.yaml line 1) but must be a number, at least 0.");
+        "personal.lambda is " + shown(value) + " (a.yaml line 1) but must be a number, at least 0.");
     EXPECT_NE(readError("personal: {lambda: " + text + "}"), "(no error)") << text;
     EXPECT_NE(readError("rounds: " + text), "(no error)") << text;
   }
@@ -437,6 +438,16 @@ TEST(Settings, YamlRoundTripsIntegersAndFlags) {
   EXPECT_EQ(back.verbose, s.verbose);
   EXPECT_EQ(back.sizes, s.sizes);
   EXPECT_EQ(back.slip, s.slip);
+}
+
+TEST(Settings, ASecondDocumentIsRefused) {
+  EXPECT_EQ(
+      errorOf([] { parseYaml("a: 1\n---\nb: 5\n", "y.yaml"); }),
+      "y.yaml line 3 is in a second YAML document, which is not read: remove the '---' before "
+      "it.");
+  EXPECT_EQ(errorOf([] { parseYaml("---\na: 1\n", "y.yaml"); }), "(no error)");
+  EXPECT_EQ(errorOf([] { parseYaml("", "y.yaml"); }),
+            "y.yaml must hold settings as 'key: value' lines.");
 }
 
 TEST(Settings, YamlReadsBackWhereAGroupIsBoundInTwoParts) {

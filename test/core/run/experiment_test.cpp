@@ -222,11 +222,30 @@ TEST(Experiment, NamesMustBePlain) {
   for (const std::string key : {"run_id", "experiment"}) {
     for (const std::string bad : {"a/b", "../x", "a b", "..", ".", "a\\b", "a'b"}) {
       EXPECT_EQ(refused({key + ":=" + bad}),
-                key + " is '" + bad + "' but must be a plain name, without blanks or slashes.");
+                key + " is '" + bad +
+                    "' but must be a plain name in UTF-8, without blanks, quotes or slashes.");
     }
   }
-  EXPECT_EQ(refused({"experiment:="}),
-            "experiment is '' but must be a plain name, without blanks or slashes.");
+  EXPECT_EQ(
+      refused({"experiment:="}),
+      "experiment is '' but must be a plain name in UTF-8, without blanks, quotes or slashes.");
+}
+
+TEST(Experiment, NamesThatATerminalOrAManifestCannotTakeAreRefused) {
+  EXPECT_EQ(refused({"run_id:=\"a\\x1b[31mRED\""}),
+            "run_id is 'a?[31mRED' but must be a plain name in UTF-8, without blanks, quotes or "
+            "slashes.");
+  EXPECT_NE(refused({"run_id:=a\xff"
+                     "b"})
+                .find("UTF-8"),
+            std::string::npos);
+  EXPECT_NE(refused({"results_dir:=/tmp/a\xff"
+                     "b"})
+                .find("UTF-8"),
+            std::string::npos);
+  EXPECT_EQ(refused({"run_id:=caf\xc3\xa9"}), "(no error)");
+  EXPECT_EQ(refused({"run_id:=" + std::string(200, 'x')}), "(no error)");
+  EXPECT_NE(refused({"run_id:=" + std::string(201, 'x')}).find("at most 200"), std::string::npos);
 }
 
 TEST(Experiment, RunIdIsMadeOfTimeAlgorithmAndSeedIfNotGiven) {

@@ -256,8 +256,9 @@ TEST(ConvergenceSettings, MistakesAreNamed) {
             "diversities names 'corner' twice: keep one of them.");
   EXPECT_EQ(errorOf("environment:\n  slip: [0, 0.1]"),
             "environment.slip has 2 values for 5 tasks: give one, or one for each task.");
-  EXPECT_EQ(errorOf("run_id: a/b"),
-            "run_id is 'a/b' but must be a plain name, without blanks or slashes.");
+  EXPECT_EQ(
+      errorOf("run_id: a/b"),
+      "run_id is 'a/b' but must be a plain name in UTF-8, without blanks, quotes or slashes.");
   EXPECT_EQ(errorOf("seed: 0", {"step_exponent:=0.5"}),
             "fixed_point.step_exponent is '0.5' (given as step_exponent:=0.5) but must be a "
             "number, above 0.5 to 1.");

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 
 namespace pmeta {
 namespace {
@@ -40,7 +41,7 @@ std::string where(const std::string& source, const YAML::Node& node) {
   return line < 0 ? source : source + " line " + std::to_string(line + 1);
 }
 
-std::string shown(const YAML::Node& node) {
+std::string textOf(const YAML::Node& node) {
   if (node.IsScalar()) return node.Scalar();
   std::string text = YAML::Dump(node);
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -73,7 +74,7 @@ bool parseInteger(const YAML::Node& node, std::int64_t& value) {
 
 [[noreturn]] void refuse(const std::string& key, const YAML::Node& node, const std::string& where,
                          const std::string& allowed) {
-  throw Error(key + " is '" + shown(node) + "' (" + where + ") but must be " + allowed + ".");
+  throw Error(key + " is " + shown(textOf(node)) + " (" + where + ") but must be " + allowed + ".");
 }
 
 // text as YAML, also within a list: bare if it is a plain word, else in double quotes
@@ -285,9 +286,9 @@ void Settings::read(const YAML::Node& root, const std::string& source) {
 void Settings::readMap(const YAML::Node& map, const std::string& prefix, const std::string& source,
                        std::set<std::string>& seen) {
   for (const auto& item : map) {
-    const std::string key = prefix + shown(item.first);
+    const std::string key = prefix + textOf(item.first);
     if (!seen.insert(key).second) {
-      throw Error("setting '" + key + "' stands twice (" + where(source, item.first) +
+      throw Error("setting " + shown(key) + " stands twice (" + where(source, item.first) +
                   "): keep one of them.");
     }
     if (const Entry* entry = find(key)) {
@@ -399,7 +400,7 @@ void Settings::refuseUnknown(const std::string& name, const std::string& where) 
     best = withLastPart(nearest(lastPart(name), short_names));
   }
   throw Error(
-      "unknown setting '" + name + "' (" + where + ")" +
+      "unknown setting " + shown(name) + " (" + where + ")" +
       (best.empty() ? "; known are " + join(keys) + "." : ": did you mean '" + best + "'?"));
 }
 
@@ -413,13 +414,18 @@ std::string formatNumber(double value) {
 }
 
 YAML::Node parseYaml(const std::string& text, const std::string& source) {
-  YAML::Node root;
+  std::vector<YAML::Node> documents;
   try {
-    root = YAML::Load(text);
+    documents = YAML::LoadAll(text);
   } catch (const YAML::Exception& error) {
     throw Error(source + " line " + std::to_string(error.mark.line + 1) +
                 " is not valid YAML: " + error.msg + ".");
   }
+  if (documents.size() > 1) {
+    throw Error(where(source, documents[1]) +
+                " is in a second YAML document, which is not read: remove the '---' before it.");
+  }
+  const YAML::Node root = documents.empty() ? YAML::Node() : documents.front();
   if (!root.IsMap()) throw Error(source + " must hold settings as 'key: value' lines.");
   return root;
 }
@@ -462,9 +468,15 @@ std::string nearest(const std::string& word, const std::vector<std::string>& can
 }
 
 void requirePlainName(const std::string& key, const std::string& value) {
-  if (value.empty() || value.find_first_of("/ \t\n\\\"'") != std::string::npos || value == "." ||
-      value == "..") {
-    throw Error(key + " is '" + value + "' but must be a plain name, without blanks or slashes.");
+  constexpr std::size_t kLongest = 200;  // a file's name has at most 255 bytes, with its ending
+  if (value.empty() || value.find_first_of("/ \\\"'") != std::string::npos || value == "." ||
+      value == ".." || !isPlainText(value)) {
+    throw Error(key + " is " + shown(value) +
+                " but must be a plain name in UTF-8, without blanks, quotes or slashes.");
+  }
+  if (value.size() > kLongest) {
+    throw Error(key + " is " + shown(value) + ", a name of " + std::to_string(value.size()) +
+                " bytes, but must have at most " + std::to_string(kLongest) + ".");
   }
 }
 

@@ -14,6 +14,7 @@
 #include <tuple>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 #include "pmeta_core/base/hash.h"
 #include "pmeta_core/personal/dqn_personal_learner.h"
 #include "pmeta_core/personal/sac_personal_learner.h"
@@ -81,6 +82,10 @@ std::vector<YAML::Node> choosePreset(YAML::Node base, const std::string& source,
 
 // nodes run in other working folders than the shell
 std::string absolutePath(const std::string& setting, std::string path) {
+  if (!isPlainText(path)) {
+    throw Error(setting + " is " + shown(path) +
+                " but must be a path in UTF-8, without control characters.");
+  }
   if (path == "~" || path.rfind("~/", 0) == 0) {
     const std::string home = environmentVariable("HOME");
     if (home.empty()) {

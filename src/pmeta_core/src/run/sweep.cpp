@@ -7,8 +7,6 @@
 #include <map>
 #include <mutex>
 #include <optional>
-#include <regex>
-#include <set>
 #include <thread>
 
 #include "pmeta_core/base/error.h"
@@ -18,102 +16,13 @@
 namespace pmeta {
 namespace {
 
-struct Axis {
-  std::string key;
-  std::vector<std::string> values;
-};
-
-// "1,5,10", "0-9" or "[1,2],[3,4]": commas inside brackets belong to a value
-std::vector<std::string> expandValues(const std::string& text) {
-  std::smatch range;
-  static const std::regex kRange("([0-9]+)-([0-9]+)");
-  std::vector<std::string> values;
-  if (std::regex_match(text, range, kRange)) {
-    const long first = std::stol(range[1]);
-    const long last = std::stol(range[2]);
-    if (last < first || last - first > 100000) {
-      throw Error("the range " + text + " must go up, by at most 100000.");
-    }
-    for (long value = first; value <= last; ++value) values.push_back(std::to_string(value));
-    return values;
-  }
-  std::string value;
-  int depth = 0;
-  for (const char c : text) {
-    if (c == '[') ++depth;
-    if (c == ']') --depth;
-    if (c == ',' && depth == 0) {
-      values.push_back(value);
-      value.clear();
-    } else {
-      value += c;
-    }
-  }
-  values.push_back(value);
-  return values;
-}
-
-std::vector<Axis> parseAxes(const std::vector<std::string>& assignments) {
-  std::vector<Axis> axes;
-  for (const std::string& assignment : assignments) {
-    const auto split = assignment.find(":=");
-    if (split == std::string::npos || split == 0) {
-      throw Error("'" + assignment + "' is not an assignment: write key:=value or key:=a,b,c.");
-    }
-    axes.push_back({assignment.substr(0, split), expandValues(assignment.substr(split + 2))});
-  }
-  return axes;
-}
-
-// every combination, the last axis running fastest
-std::vector<std::vector<std::string>> combinations(const std::vector<Axis>& axes) {
-  std::vector<std::vector<std::string>> all = {{}};
-  for (const Axis& axis : axes) {
-    std::vector<std::vector<std::string>> longer;
-    for (const auto& head : all) {
-      for (const std::string& value : axis.values) {
-        longer.push_back(head);
-        longer.back().push_back(axis.key + ":=" + value);
-      }
-    }
-    all = std::move(longer);
-    if (all.size() > 100000) throw Error("the sweep has more than 100000 runs: split it.");
-  }
-  return all;
-}
-
-// what decides a run's numbers: all but its name
-std::map<std::string, std::string> identity(const std::string& yaml) {
-  std::map<std::string, std::string> settings = Experiment::definingSettings(yaml);
-  settings.erase("run_id");
-  return settings;
-}
-
-// a folder name out of the settings that vary: "algorithm_pmeta-lambda_5-seed_0"
-std::string nameRun(const Experiment& experiment, const std::vector<Axis>& axes) {
-  const std::map<std::string, std::string> values = flatSettings(YAML::Load(experiment.yaml()));
-  std::string name;
-  for (const Axis& axis : axes) {
-    if (axis.values.size() < 2) continue;
-    for (const auto& entry : values) {
-      const std::string& key = entry.first;
-      const std::string last = key.substr(key.rfind('.') + 1);
-      if (key != axis.key && last != axis.key) continue;
-      name += (name.empty() ? "" : "-") + last + "_" + entry.second;
-    }
-  }
-  static const std::regex kUnfit("[^A-Za-z0-9_.+-]+");
-  name = std::regex_replace(name, kUnfit, "_");
-  return name.empty() ? "run" : name;
-}
-
 // throws Error if there is a run of that name that has other settings
 void requireSameSettings(const Experiment& experiment) {
   const std::string dir = experiment.runDir();
   const std::string config = dir + "/config.yaml";
   if (!std::filesystem::exists(config)) return;
-  const auto found = identity(readFile(config, "the settings file"));
-  const auto expected = identity(experiment.yaml());
+  const auto found = decidingSettings(readFile(config, "the settings file"));
+  const auto expected = decidingSettings(experiment.yaml());
   const std::string key = firstDifference(found, expected);
   if (key.empty()) return;
   const auto shown = [&](const std::map<std::string, std::string>& settings) {
@@ -155,25 +64,6 @@ std::optional<BegunRun> beginRun(const Experiment& experiment, bool resume) {
 }
 
 }  // namespace
-
-std::vector<Experiment> planSweep(const SweepPlan& plan) {
-  if (plan.name.empty() || plan.name.find('/') != std::string::npos) {
-    throw Error("the sweep's name is '" + plan.name + "' but must be a plain name.");
-  }
-  const std::vector<Axis> axes = parseAxes(plan.assignments);
-  std::vector<Experiment> runs;
-  std::set<std::map<std::string, std::string>> seen;
-  for (const std::vector<std::string>& assignments : combinations(axes)) {
-    const Experiment base = Experiment::load(plan.config, assignments);
-    if (!seen.insert(identity(base.yaml())).second) continue;
-    std::vector<std::string> placed = assignments;
-    placed.push_back("results_dir:=" + base.settings().results_dir + "/sweeps/" + plan.name);
-    placed.push_back("run_id:=" + nameRun(base, axes));
-    if (!plan.resume) placed.push_back("checkpoint.interval:=0");
-    runs.push_back(Experiment::load(plan.config, placed));
-  }
-  return runs;
-}
 
 std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
                      const std::function<void(const SweepProgress&)>& on_progress) {

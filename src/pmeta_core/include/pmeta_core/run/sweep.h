@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,8 @@ namespace pmeta {
 struct SweepPlan {
   std::string name;    ///< runs go to <results_dir>/sweeps/<name>/<experiment>/<run_id>
   std::string config;  ///< path of the settings file
-  /// "key:=a,b,c", "seed:=0-9" (a range of whole numbers), or "key:=value" for all runs.
+  /// "key:=a,b,c", "seed:=0-9" or "seed:=0-2,5" (ranges of whole numbers), or "key:=value" for
+  /// all runs.
   std::vector<std::string> assignments;
   int jobs = 1;  ///< runs at a time, one thread each
   /// Runs make checkpoints (checkpoint.interval), and one that was cut off goes on from them;
@@ -33,6 +35,10 @@ struct SweepProgress {
   double seconds = 0;      ///< of this run
   double eta_seconds = 0;  ///< for the rest
 };
+
+/// Of effective settings as YAML, those that decide a run's numbers: Experiment::definingSettings()
+/// without the run's name.
+std::map<std::string, std::string> decidingSettings(const std::string& yaml);
 
 /// The runs of a plan, checked, each once: combinations with equal effective settings (an algorithm
 /// may fix some) are one run. Throws Error before anything is run.
