@@ -83,6 +83,17 @@ TEST_F(CartPoleSceneTest, PoliciesDifferInColourAndFallenPolesFromBoth) {
   EXPECT_EQ("fell at step 20", find(scene_->moving(content_, start_), "steps", 0).text);
 }
 
+TEST_F(CartPoleSceneTest, ACartThatLeavesItsTrackHasNotFallenAndTheTextIsBesideThePole) {
+  std::vector<double> observations;
+  for (int i = 0; i <= 25; ++i) observations.insert(observations.end(), {0.1 * i, 5, 0, 0});
+  content_.tasks[0].personal.episode = shared(episodeOf(0, Trajectory::PERSONAL, 4, observations));
+  EXPECT_GT(find(scene_->moving(content_, start_), "steps", 0).pose.position.x, 0);
+  start_[0] = 100;
+  const Marker text = find(scene_->moving(content_, start_), "steps", 0);
+  EXPECT_EQ("left the track at step 25", text.text);
+  EXPECT_LT(text.pose.position.x, 0);
+}
+
 TEST_F(CartPoleSceneTest, TracesStayShort) {
   content_.tasks[0].meta.episode = shared(drive(0, Trajectory::META, 200));
   const std::size_t length = lengthOf(scene_->still(content_));

@@ -248,6 +248,46 @@ void expectGuarded(Msg msg, const std::vector<std::function<void(Msg&)>>& change
   }
 }
 
+TEST(Conversions, ScoresHaveThePoliciesByTaskAndWhatIsNotThereIsNan) {
+  const pmeta::Experiment experiment = pmeta::Experiment::parse(
+      "{run_id: run, environment: {name: gridworld, sizes: [4, 5, 6]}}", "test");
+  pmeta::RoundBook::Round round;
+  round.summary.run_id = "run";
+  round.summary.round = 3;
+  round.summary.rounds = 10;
+  round.summary.personal_return = -2;
+  for (const auto policy : {pmeta::Policy::kPersonal, pmeta::Policy::kMeta}) {
+    pmeta::RoundRow row;
+    row.result.task = policy == pmeta::Policy::kPersonal ? 1 : 2;
+    row.result.policy = policy;
+    row.result.mean = policy == pmeta::Policy::kPersonal ? -2 : -7;
+    round.rows.push_back(row);
+  }
+  const pmeta_msgs::Scores msg = overTheWire(toScores(round, experiment));
+  EXPECT_EQ(msg.round, 3u);
+  EXPECT_EQ(msg.training_tasks, 3u);
+  EXPECT_EQ(msg.tasks, (std::vector<std::string>{"grid_4x4", "grid_5x5", "grid_6x6"}));
+  ASSERT_EQ(msg.personal.size(), 3u);
+  EXPECT_TRUE(std::isnan(msg.personal[0]));
+  EXPECT_EQ(msg.personal[1], -2);
+  EXPECT_TRUE(std::isnan(msg.meta[1]));
+  EXPECT_EQ(msg.meta[2], -7);
+  EXPECT_EQ(msg.personal_mean, -2);
+}
+
+TEST(Conversions, StatesHaveNamesAndAStrangersNumberIsUnknown) {
+  pmeta_msgs::RoundSummary round;
+  round.state = pmeta_msgs::RoundSummary::BLOCKED;
+  EXPECT_EQ(stateName(round), "blocked");
+  round.state = 250;
+  EXPECT_EQ(stateName(round), "unknown");
+  pmeta_msgs::AgentStatus status;
+  status.state = pmeta_msgs::AgentStatus::FAILED;
+  EXPECT_EQ(stateName(status), "failed");
+  status.state = 6;
+  EXPECT_EQ(stateName(status), "unknown");
+}
+
 TEST(Conversions, TheMacOfAnUpdateGuardsEachField) {
   using M = pmeta_msgs::AuxiliaryUpdate;
   expectGuarded<M>(

@@ -306,6 +306,10 @@ TEST(GridworldScene, TextsSayRoundReturnsAndWhatIsMissing) {
   EXPECT_EQ("mean meta return (MP) -", text("title", 2));
   EXPECT_EQ("grid_4x4 meta (MP)", text("labels", 1));
   EXPECT_EQ("round 7, return -3.50", text("returns", 1));
+  Trajectory lost = walk(grids[0], Trajectory::META);
+  lost.truncated = true;
+  scene.tasks[0].meta.episode = shared(lost);
+  EXPECT_EQ("round 7, return -3.50, landmark not reached", text("returns", 1));
 
   scene.has_meta = false;
   EXPECT_EQ("no meta-policy here", text("returns", 1));

@@ -80,7 +80,7 @@ TEST_F(MountainCarSceneTest, SaysWhenTheGoalIsReached) {
   Trajectory message = drive(0, Trajectory::PERSONAL, 20);
   content_.tasks[0].personal.episode = shared(message);
   start_[0] = 100;
-  EXPECT_EQ("step 20", find(scene_->moving(content_, start_), "steps", 0).text);
+  EXPECT_EQ("goal not reached by step 20", find(scene_->moving(content_, start_), "steps", 0).text);
   message.terminated = true;
   content_.tasks[0].personal.episode = shared(message);
   EXPECT_EQ("goal at step 20", find(scene_->moving(content_, start_), "steps", 0).text);

@@ -81,12 +81,27 @@ TEST(RunState, KeepsTheNewestReturnAndTheOneAfterMostExploration) {
   less.context_episodes = 5;
   less.return_mean = -3;
   state.take(less);
-  EXPECT_EQ(state.tasks[0].meta.mean, -2);
+  EXPECT_EQ(state.shown(state.tasks[0].meta).mean, -2);
   state.take(returnOf(0, TaskReturn::META, 2, -9));
-  EXPECT_EQ(state.tasks[0].meta.mean, -2) << "an older round says nothing new";
+  EXPECT_EQ(state.shown(state.tasks[0].meta).mean, -2) << "an older round says nothing new";
   state.take(returnOf(0, TaskReturn::META, 4, -7));
-  EXPECT_EQ(state.tasks[0].meta.mean, -7);
-  EXPECT_TRUE(std::isnan(state.tasks[0].personal.mean));
+  EXPECT_EQ(state.shown(state.tasks[0].meta).mean, -7);
+  EXPECT_TRUE(std::isnan(state.shown(state.tasks[0].personal).mean));
+}
+
+TEST(RunState, ShowsReturnsAsOfTheLastCompleteRoundInWhateverOrderTheyCome) {
+  RunState state;
+  EXPECT_EQ(state.tableText(), "task");
+  state.take(returnOf(0, TaskReturn::PERSONAL, 4, -4));
+  state.take(returnOf(0, TaskReturn::PERSONAL, 3, -3));
+  state.take(summaryOf(3, RoundSummary::PAUSED));
+  state.take(returnOf(0, TaskReturn::META, 3, -5));
+  EXPECT_EQ(state.shown(state.tasks[0].personal).mean, -3) << "round 4 is not complete";
+  EXPECT_EQ(state.tableText(), "task, round 3");
+  state.take(summaryOf(4, RoundSummary::RUNNING));
+  EXPECT_EQ(state.shown(state.tasks[0].personal).mean, -4);
+  EXPECT_EQ(state.shown(state.tasks[0].meta).mean, -5);
+  EXPECT_EQ(state.tableText(), "task, rounds 3 to 4");
 }
 
 TEST(RunState, AnotherRunBeginsAnew) {
@@ -225,7 +240,7 @@ TEST_F(RunPanelTest, ShowsARunWithDotsInItsNumbers) {
   EXPECT_EQ(label("pp"), "PP -3.25");
   EXPECT_EQ(label("mp"), "MP -4.50");
   EXPECT_EQ(label("test"), "test -1.50");
-  EXPECT_EQ(label("eta"), "ETA 1:05 min");
+  EXPECT_EQ(label("eta"), "ETA 0:01:05");
   EXPECT_EQ(get<QProgressBar>("progress")->value(), 12);
   EXPECT_EQ(get<QProgressBar>("progress")->text().toStdString(), "round 12 of 40");
   ASSERT_EQ(get<QTableWidget>("tasks")->rowCount(), 5);

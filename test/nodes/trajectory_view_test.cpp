@@ -98,6 +98,52 @@ TEST(TrajectoryViewNode, AWatcherThatComesLateSeesTheLastEpisodesMoving) {
   }
 }
 
+std::string labelOf(const MarkerArray& markers, int id) {
+  if (markers.markers.empty()) return "";
+  return find(markers, "results", id).text;
+}
+
+TEST(TrajectoryViewNode, AllIsShownAsOfTheLastCompleteRound) {
+  using pmeta_msgs::RoundSummary;
+  ros::NodeHandle nh;
+  ros::Publisher rounds = nh.advertise<RoundSummary>("/pmeta/round", 4);
+  ros::Publisher returns = nh.advertise<TaskReturn>("/pmeta/returns", 4);
+  Watcher watcher(nh);
+  ASSERT_TRUE(
+      waitFor([&] { return rounds.getNumSubscribers() == 1 && returns.getNumSubscribers() == 1; }));
+  const auto complete = [&](std::uint32_t round) {
+    RoundSummary summary;
+    summary.run_id = "run";
+    summary.round = round;
+    rounds.publish(summary);
+  };
+  const auto result = [&](std::uint32_t round, double mean) {
+    TaskReturn message;
+    message.run_id = "run";
+    message.task = 1;
+    message.policy = TaskReturn::PERSONAL;
+    message.round = round;
+    message.return_mean = mean;
+    returns.publish(message);
+  };
+  complete(4);
+  result(4, 40);
+  EXPECT_TRUE(waitFor([&] { return labelOf(watcher.markers, 2) == "personal return 40.00"; }));
+  result(5, 50);
+  // what comes after it on the same topic is there: so was the return of round 5
+  TaskReturn meta;
+  meta.run_id = "run";
+  meta.task = 1;
+  meta.policy = TaskReturn::META;
+  meta.round = 4;
+  meta.return_mean = 39;
+  returns.publish(meta);
+  EXPECT_TRUE(waitFor([&] { return labelOf(watcher.markers, 3) == "meta return 39.00"; }));
+  EXPECT_EQ(labelOf(watcher.markers, 2), "personal return 40.00");
+  complete(5);
+  EXPECT_TRUE(waitFor([&] { return labelOf(watcher.markers, 2) == "personal return 50.00"; }));
+}
+
 }  // namespace
 }  // namespace pmeta_nodes
 

@@ -9,6 +9,7 @@
 #   speed:=2         how fast rviz plays episodes
 #   hold:=true       stay after the last round until Ctrl-C
 #   record:=true     record all topics beside the run folder
+#   ns:=NAME         nodes and topics below /NAME/pmeta, for several runs on one ROS master
 #   resume:=RUN_DIR  go on with a run that was stopped or killed
 #
 # Examples:

@@ -12,8 +12,9 @@ namespace {
 constexpr std::size_t kObservation = 4;  // position, velocity, angle, angular velocity
 constexpr double kHalfTrack = 2.6;       // m, of which kPositionLimit may be used
 constexpr double kCartWidth = 0.46;
-constexpr double kTrace = 0.5;  // m below the track
-constexpr double kAir = 0.12;   // above an upright pole
+constexpr double kTrace = 0.5;    // m below the track
+constexpr double kAir = 0.12;     // above an upright pole
+constexpr double kBeside = 0.25;  // m, from where a pole may reach the text on the right
 constexpr double kAngleLimit = 12 * kPi / 180;
 constexpr std::size_t kMostTracePoints = 200;
 
@@ -34,11 +35,8 @@ double longestPole(const pmeta::CartPoleFamily& family) {
   return std::min(longest, CartPoleScene::kLongestPole);
 }
 
-/// Has the episode left its limits?
-bool isFallen(const Trajectory& episode, std::size_t step) {
-  const double* at = &episode.observations[step * kObservation];
-  return std::abs(at[0]) > CartPoleScene::kPositionLimit || std::abs(at[2]) > kAngleLimit;
-}
+bool isFallen(const double* at) { return std::abs(at[2]) > kAngleLimit; }
+bool isOffTrack(const double* at) { return std::abs(at[0]) > CartPoleScene::kPositionLimit; }
 
 void drawTrack(Figure& figure, double scale) {
   const double end = CartPoleScene::kPositionLimit * scale;
@@ -132,9 +130,9 @@ void CartPoleScene::drawMoving(const PolicyView& view, int task, int policy, dou
   const std::string frame = policyFrame(task, policy);
   const bool shown = view.episode != nullptr;
   const std::size_t step = shown ? stepAt(*view.episode, seconds, kTimeStep) : 0;
-  const bool fallen = shown && isFallen(*view.episode, step);
   const double* at = shown ? &view.episode->observations[step * kObservation] : nullptr;
-  const Color color = fallen ? kFallen : policyColor(policy);
+  const bool over = shown && (isFallen(at) || isOffTrack(at));
+  const Color color = over ? kFallen : policyColor(policy);
   const double s = scale();
 
   scene.markers.push_back(
@@ -150,15 +148,16 @@ void CartPoleScene::drawMoving(const PolicyView& view, int task, int policy, dou
       policyMarker(frame, "poles", task, policy, kPoleLayer, shown, [&](Figure& figure) {
         const double width = 0.07 * s;
         figure.rectangle(-width / 2, 0, width / 2, poleLength(task) * s,
-                         mix(color, kInk, fallen ? 0 : 0.45));
+                         mix(color, kInk, over ? 0 : 0.45));
         figure.disc({0, 0}, width, kInk);
         figure.place({at[0] * s, kCartHeight * s}, -at[2]);
       }));
-  const std::string text = !shown   ? ""
-                           : fallen ? "fell at step " + std::to_string(step)
-                                    : "step " + std::to_string(step);
+  const std::string what = !over ? "" : isFallen(at) ? "fell at " : "left the track at ";
+  const std::string text = shown ? what + "step " + std::to_string(step) : "";
+  // on the side where the pole is not
+  const double side = shown && at[0] > kBeside ? -1 : 1;
   scene.markers.push_back(textMarker(frame, "steps", policyId(task, policy),
-                                     {1.6 * s, (kCartHeight + 0.5) * s}, kTextLayer, text,
+                                     {side * 1.6 * s, (kCartHeight + 0.5) * s}, kTextLayer, text,
                                      0.85 * cards_.letter, 1.9 * s, kFaint));
 }
 

@@ -1,5 +1,6 @@
 #include "conversions.h"
 
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -259,6 +260,44 @@ pmeta::RoundSummary fromMsg(const pmeta_msgs::RoundSummary& msg) {
   summary.seconds = msg.round_s;
   summary.eta_seconds = msg.eta_s;
   return summary;
+}
+
+pmeta_msgs::Scores toScores(const pmeta::RoundBook::Round& round,
+                            const pmeta::Experiment& experiment) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  const int tasks = experiment.totalTasks();
+  pmeta_msgs::Scores msg;
+  msg.run_id = round.summary.run_id;
+  msg.experiment = experiment.settings().experiment;
+  msg.round = static_cast<std::uint32_t>(round.summary.round);
+  msg.rounds = static_cast<std::uint32_t>(round.summary.rounds);
+  for (int task = 0; task < tasks; ++task) msg.tasks.push_back(experiment.family().taskName(task));
+  msg.training_tasks = static_cast<std::uint32_t>(experiment.numTasks());
+  msg.personal.assign(tasks, none);
+  msg.meta.assign(tasks, none);
+  for (const pmeta::RoundRow& row : round.rows) {
+    const pmeta::TaskReturn& result = row.result;
+    if (result.policy == pmeta::Policy::kPersonal) {
+      msg.personal.at(result.task) = result.mean;
+    } else if (result.context_episodes == experiment.contextEpisodes().back()) {
+      msg.meta.at(result.task) = result.mean;
+    }
+  }
+  msg.personal_mean = round.summary.personal_return;
+  msg.meta_mean = round.summary.meta_return;
+  msg.test_mean = round.summary.test_return;
+  return msg;
+}
+
+std::string stateName(const pmeta_msgs::AgentStatus& msg) {
+  const char* const names[] = {"unknown", "waiting", "training", "evaluating", "done", "failed"};
+  return names[msg.state < std::size(names) ? msg.state : 0];
+}
+
+std::string stateName(const pmeta_msgs::RoundSummary& msg) {
+  const char* const names[] = {"unknown", "running", "late",   "finished",
+                               "stopped", "paused",  "blocked"};
+  return names[msg.state < std::size(names) ? msg.state : 0];
 }
 
 pmeta::Mac macOf(const pmeta::Authenticator& authenticator,

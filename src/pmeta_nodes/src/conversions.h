@@ -1,9 +1,11 @@
 #pragma once
 
+#include <pmeta_msgs/AgentStatus.h>
 #include <pmeta_msgs/AuxiliaryUpdate.h>
 #include <pmeta_msgs/MetaPolicy.h>
 #include <pmeta_msgs/ModelBlob.h>
 #include <pmeta_msgs/RoundSummary.h>
+#include <pmeta_msgs/Scores.h>
 #include <pmeta_msgs/TaskReturn.h>
 #include <pmeta_msgs/Trajectory.h>
 
@@ -12,6 +14,7 @@
 #include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/protocol.h"
+#include "pmeta_core/run/run_log.h"
 
 namespace pmeta_nodes {
 
@@ -39,6 +42,14 @@ pmeta_msgs::Trajectory toMsg(const pmeta::Episode& episode, const pmeta::Experim
 pmeta_msgs::RoundSummary toMsg(const pmeta::RoundSummary& summary,
                                const pmeta::Experiment& experiment);
 pmeta::RoundSummary fromMsg(const pmeta_msgs::RoundSummary& msg);
+
+/// The returns of an evaluated round, by task.
+pmeta_msgs::Scores toScores(const pmeta::RoundBook::Round& round,
+                            const pmeta::Experiment& experiment);
+
+/// A message's state as a word: "waiting", "running", ...; "unknown" if it is none of the type's.
+std::string stateName(const pmeta_msgs::AgentStatus& msg);
+std::string stateName(const pmeta_msgs::RoundSummary& msg);
 
 // The MAC that a message's contents ask for, read from the message as it is. They throw
 // pmeta::Error if a field is of no run.

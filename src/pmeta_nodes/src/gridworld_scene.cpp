@@ -291,7 +291,9 @@ void drawTask(const GridGeometry& grid, int task, const Layout& layout, const Sc
     scene.markers.push_back(drawPath(picture));
     scene.markers.push_back(drawLandmark(picture));
     scene.markers.push_back(drawEnds(picture));
-    drawLabels(picture, resultText(view, content, is_meta), scene);
+    const bool lost = view.episode && view.episode->truncated;
+    drawLabels(picture, resultText(view, content, is_meta) + (lost ? ", landmark not reached" : ""),
+               scene);
   }
 }
 

@@ -13,9 +13,11 @@ run folder.
 private parameters
   ~hold         stay after the last round until stopped (default false)
   ~resume       go on with the run that the run folder holds, if it holds one (default false)
+  ~await_viewer    round 1 waits for rviz on trajectory_view, 30 s at most (default false)
+  ~await_recorder  round 1 waits for rosbag's node `recorder` to hear all, 30 s at most (default false)
   ~config_file  settings file; by default the parameter `config` of the namespace is read
 subscribes   auxiliary, returns
-publishes    meta_policy, round (both latched), /diagnostics
+publishes    meta_policy, round, scores (all latched), /diagnostics
 offers       pause (std_srvs/SetBool): true holds the next meta-policy back, false lets the run go on
              save_checkpoint (std_srvs/Trigger): all save one when the next round is done
 Normally started by roslaunch pmeta_nodes gridworld.launch.

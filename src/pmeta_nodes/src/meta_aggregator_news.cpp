@@ -7,6 +7,7 @@
 
 #include "conversions.h"
 #include "meta_aggregator_node.h"
+#include "onlookers.h"
 #include "pmeta_core/base/error.h"
 
 namespace pmeta_nodes {
@@ -16,6 +17,8 @@ using pmeta_msgs::RoundSummary;
 
 constexpr auto kAnnounceEvery = std::chrono::seconds(5);
 constexpr auto kHealthEvery = std::chrono::milliseconds(500);
+constexpr std::chrono::seconds kOnlookersWithin{30};
+constexpr std::chrono::milliseconds kLookAgain{100};
 constexpr char kHeld[] = " The run is held until that is mended.";
 
 std::string timeOfDay(std::time_t time) {
@@ -43,6 +46,7 @@ void MetaAggregatorNode::publishRound(std::uint8_t state, const std::string& mes
                      : paused ? kPaused + (message.empty() ? "" : "; " + message)
                      : silent ? silenceText() + "; " + message
                               : message;
+  summary_.state_name = stateName(summary_);
   summary_.header.stamp = ros::Time::now();
   const std::vector<std::uint32_t> of_last_round = summary_.missing;
   if (silent) summary_.missing.assign(silent_.begin(), silent_.end());
@@ -90,6 +94,31 @@ void MetaAggregatorNode::announcePause() {
   } else {
     ROS_INFO("the run goes on.");
   }
+}
+
+void MetaAggregatorNode::awaitOnlookers() {
+  ros::NodeHandle own("~");
+  const Onlookers onlookers(own.param("await_viewer", false), own.param("await_recorder", false),
+                            experiment_.totalTasks());
+  const Clock::time_point limit = Clock::now() + kOnlookersWithin;
+  const std::string round = "round " + std::to_string(roundInHand());
+  std::string missing;
+  std::string told;
+  while (!stop_ && !(missing = onlookers.missing()).empty() && Clock::now() < limit) {
+    if (missing != told) {
+      const std::string text = round + " waits for " + missing + ", " +
+                               std::to_string(kOnlookersWithin.count()) + " s at most";
+      ROS_INFO("%s", text.c_str());
+      publishRound(RoundSummary::RUNNING, text);
+      told = missing;
+    }
+    std::this_thread::sleep_for(kLookAgain);
+  }
+  if (!missing.empty() && !stop_)
+    ROS_WARN("%s goes on without %s.", round.c_str(), missing.c_str());
+  // an aggregator that is started again finds them there, or closed for good
+  own.setParam("await_viewer", false);
+  own.setParam("await_recorder", false);
 }
 
 void MetaAggregatorNode::announceMissing() {
@@ -176,6 +205,7 @@ void announceStop(const pmeta::Experiment& experiment, const std::string& why) {
   summary.rounds = static_cast<std::uint32_t>(experiment.settings().rounds);
   summary.personal_return = summary.meta_return = summary.test_return = std::nan("");
   summary.state = RoundSummary::STOPPED;
+  summary.state_name = stateName(summary);
   summary.message = why;
   summary.header.stamp = ros::Time::now();
   sign(pmeta::Authenticator(experiment.settings().key_file), summary);

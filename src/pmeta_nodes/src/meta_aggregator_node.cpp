@@ -56,6 +56,7 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
   meta_pub_ = nh_.advertise<pmeta_msgs::MetaPolicy>("meta_policy", 1, true);
   round_pub_ = nh_.advertise<RoundSummary>("round", 8, true);
+  scores_pub_ = nh_.advertise<pmeta_msgs::Scores>("scores", 1, true);
   auxiliary_sub_ = nh_.subscribe<pmeta_msgs::AuxiliaryUpdate>(
       "auxiliary", queue,
       boost::function<void(const pmeta_msgs::AuxiliaryUpdate::Ptr&)>(
@@ -189,6 +190,7 @@ void MetaAggregatorNode::runRounds() {
            experiment_.numTasks(),
            tests == 0 ? "" : (" and " + std::to_string(tests) + " test tasks").c_str(), rounds,
            dir.c_str());
+  awaitOnlookers();
   publishRound(RoundSummary::RUNNING, "waiting for the agents' first updates");
   publishMetaPolicy();
   while (!stop_ && (book_.roundsTaken() < rounds || !unwritten_.empty())) {
@@ -210,8 +212,8 @@ void MetaAggregatorNode::runRounds() {
   }
   if (finished) {
     log_->finish("finished");
-    publishRound(RoundSummary::FINISHED, "all rounds are done; results in " + dir);
     logLines(console_.table() + "finished; " + pmeta::listRunFolder(dir));
+    publishRound(RoundSummary::FINISHED, "all rounds are done; results in " + dir);
   } else {
     log_->finish("stopped");
     publishRound(RoundSummary::STOPPED, "stopped in round " + std::to_string(meta.round + 1));
@@ -320,6 +322,10 @@ void MetaAggregatorNode::collectCompleteRounds(bool force) {
       summary_.personal_return = before.personal_return;
       summary_.meta_return = before.meta_return;
       summary_.test_return = before.test_return;
+    } else {
+      pmeta_msgs::Scores scores = toScores(round, experiment_);
+      scores.header.stamp = ros::Time::now();
+      scores_pub_.publish(scores);
     }
     const std::vector<int>& excluded = round.summary.excluded;
     publishRound(

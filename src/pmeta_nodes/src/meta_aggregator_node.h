@@ -35,8 +35,8 @@ namespace pmeta_nodes {
 
 /// A MetaAggregator on ROS: one worker thread owns the rounds, callbacks only hand messages to it.
 ///
-/// Subscribes to auxiliary and returns; publishes meta_policy and round (both latched), and writes
-/// the run folder. A round is closed once every task's update and return are in, or, after
+/// Subscribes to auxiliary and returns; publishes meta_policy, round and scores (all latched), and
+/// writes the run folder. A round is closed once every task's update and return are in, or, after
 /// round_timeout, once a quorum of updates is. Who has not been heard of for 1.5 s, or is late, is
 /// named on `round`: since when, and what happens next.
 ///
@@ -80,6 +80,7 @@ class MetaAggregatorNode {
   bool onEvaluate(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   void work();
   void runRounds();
+  void awaitOnlookers();
   void take(const Message& message);
   void takeUpdate(pmeta_msgs::AuxiliaryUpdate& msg);
   void takeReturn(const pmeta_msgs::TaskReturn& msg);
@@ -128,6 +129,7 @@ class MetaAggregatorNode {
   ros::Publisher meta_pub_;
   pmeta_msgs::MetaPolicy::ConstPtr meta_msg_;  ///< the newest, as it was sent
   ros::Publisher round_pub_;
+  ros::Publisher scores_pub_;
   ros::Subscriber auxiliary_sub_;
   ros::Subscriber returns_sub_;
   ros::Subscriber status_sub_;

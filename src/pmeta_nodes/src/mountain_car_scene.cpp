@@ -203,8 +203,10 @@ void MountainCarScene::drawMoving(const PolicyView& view, int task, int policy, 
                                        }));
   std::string text;
   if (shown) {
-    const bool at_goal = view.episode->terminated && step == numSteps(*view.episode);
-    text = (at_goal ? "goal at step " : "step ") + std::to_string(step);
+    const bool ended = step == numSteps(*view.episode);
+    const bool at_goal = ended && view.episode->terminated;
+    text = at_goal ? "goal at step " : ended ? "goal not reached by step " : "step ";
+    text += std::to_string(step);
   }
   const double x = (kLeft + (is_meta ? 0.75 : 0.25) * kTrackWidth) * s;
   scene.markers.push_back(textMarker(hillFrame(task), "steps", policyId(task, policy),

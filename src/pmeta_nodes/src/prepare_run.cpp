@@ -1,16 +1,21 @@
 // prepare_run: what a launch file runs while it is read. Checks the settings before anything
 // starts, writes the launch file that holds one agent for each task, and prints the effective
 // settings, which become the parameter that all nodes read.
+#include <ros/names.h>
+
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "launch_parent.h"
 #include "launch_words.h"
+#include "live_nodes.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/run/authentication.h"
@@ -29,14 +34,18 @@ constexpr char kHelp[] =
   rosrun pmeta_nodes prepare_run --check LAUNCH_FILE CONFIG [key:=value ...]
 
 CONFIG         settings file; with resume:=RUN_DIR the run there goes on, with its own settings
-AGENTS_LAUNCH  launch file to write: a task_agent for each training and test task and, with record:=true, rosbag
+AGENTS_LAUNCH  launch file to write: a task_agent for each training and test task (unless agents:=false),
+               with record:=true rosbag, and the settings as the parameters below `settings`
 LAUNCH_FILE    launch file of pMeta's: checks what it is to be called with, and prints the run's folder and
                how many agents it has
 key:=value     settings that override the file's; an empty value leaves the file's. The value of
                `settings` is itself a list of assignments: "settings:=slip=0.1 sizes=[4, 5]".
+ns:=NAME       the launch's nodes are below /NAME/pmeta; by default below /pmeta. ROS_NAMESPACE goes before
+               either. With view:=true there is a trajectory_view among them
 Launch files call it with --launch FOLDER LINES, where LINES has the words, a line each; then the
 settings on roslaunch's own command line count too, declared or not.
-Exits with 1 and one sentence if the settings are bad.
+Exits with 1 and one sentence if the settings are bad or, without --check, if nodes of the same names
+live: the ROS master would end them, and theirs is a run that goes on.
 )";
 
 // what the launch file passes: empty values mean "as in the file"
@@ -82,6 +91,54 @@ bool takeFlag(std::vector<std::string>& assignments, const std::string& key, boo
   throw Error(key + " is " + pmeta::shown(value) + " but must be true or false.");
 }
 
+/// What a launch starts besides the settings.
+struct Launch {
+  std::string ns;  ///< of the run, e.g. "/pmeta"
+  bool agents = true;
+  bool view = false;
+  bool record = false;
+};
+
+Launch takeLaunch(std::vector<std::string>& assignments) {
+  const std::string name = takeAssignment(assignments, "ns");
+  const char* around = std::getenv("ROS_NAMESPACE");
+  const std::string outer = around == nullptr ? "" : around;
+  Launch launch;
+  std::string problem;
+  launch.ns = ros::names::clean(name.rfind('/', 0) == 0 ? name + "/pmeta"
+                                                        : "/" + outer + "/" + name + "/pmeta");
+  if (!ros::names::validate(launch.ns, problem)) {
+    throw Error("ns is " + pmeta::shown(name) +
+                " but must be a name of letters, digits, '_' and '/', beginning with a letter.");
+  }
+  launch.agents = takeFlag(assignments, "agents", true);
+  launch.view = takeFlag(assignments, "view", false);
+  launch.record = takeFlag(assignments, "record", false);
+  for (const char* key : {"rviz", "hold"}) takeFlag(assignments, key, false);
+  return launch;
+}
+
+// a master ends the node that has a name when another one takes it
+void requireFreeNames(const Experiment& experiment, const Launch& launch) {
+  std::vector<std::string> names = {"run_guard", "meta_aggregator"};
+  if (launch.view) names.push_back("trajectory_view");
+  if (launch.record) names.push_back("recorder");
+  for (int task = 0; task < experiment.totalTasks() && launch.agents; ++task) {
+    names.push_back("task_agent_" + std::to_string(task));
+  }
+  for (std::string& name : names) name = launch.ns + "/" + name;
+  const std::string master = pmeta_nodes::launchMaster();
+  const std::vector<pmeta_nodes::LiveNode> live = pmeta_nodes::liveNodes(master, names);
+  if (live.empty()) return;
+  const std::string run = pmeta_nodes::runOf(master, launch.ns + "/config");
+  throw Error(
+      (run.empty() ? "a run" : "the run " + pmeta::shown(run)) + " is alive on the ROS master at " +
+      master + ": " + pmeta_nodes::listNodes(live) +
+      ". Stop it first (Ctrl-C in its terminal, or kill these processes), or start this one "
+      "in a namespace (ns:=NAME) or on a master of its own "
+      "(ROS_MASTER_URI=http://localhost:PORT).");
+}
+
 std::string escapeXml(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -110,26 +167,35 @@ std::string quoted(std::string text) {
   return "'" + text + "'";
 }
 
-std::string agentsLaunch(const Experiment& experiment, bool record) {
+// parameters hold no whole numbers of more than 32 bits: such a seed is given as text
+std::string parameterYaml(const Experiment& experiment) {
+  return std::regex_replace(experiment.yaml(), std::regex("(: )([0-9]{10,})(\n)"), "$1\"$2\"$3");
+}
+
+std::string agentsLaunch(const Experiment& experiment, const Launch& launch) {
   std::ostringstream xml;
-  xml << "<launch>\n";
-  for (int task = 0; task < experiment.totalTasks(); ++task) {
+  xml << "<launch>\n"
+      << "  <rosparam ns=\"settings\" subst_value=\"false\">\n"
+      << escapeXml(parameterYaml(experiment)) << "  </rosparam>\n";
+  for (int task = 0; task < experiment.totalTasks() && launch.agents; ++task) {
     xml << "  <node name=\"task_agent_" << task
         << "\" pkg=\"pmeta_nodes\" type=\"task_agent\" respawn=\"true\" respawn_delay=\"1\">\n"
         << "    <param name=\"task\" value=\"" << task << "\"/>\n"
         << "    <param name=\"resume\" value=\"true\"/>\n"
         << "  </node>\n";
   }
-  if (record) {
+  if (launch.record) {
     const std::string bag = experiment.runDir() + ".bag";
     xml << "  <node name=\"recorder\" pkg=\"rosbag\" type=\"record\" args=\"-O "
-        << escapeXml(quoted(bag)) << " -e '/pmeta/.*' -x /pmeta/playback\"/>\n";
+        << escapeXml(quoted(bag)) << " -e '" << launch.ns << "/.*' -x " << launch.ns
+        << "/playback\"/>\n";
   }
   xml << "</launch>\n";
   return xml.str();
 }
 
-// launch files of runs long over
+// launch files of launches that ended before their nodes were started; others are deleted by
+// run_guard
 void removeOldLaunchFiles(const std::filesystem::path& file) {
   namespace fs = std::filesystem;
   std::error_code error;
@@ -138,7 +204,7 @@ void removeOldLaunchFiles(const std::filesystem::path& file) {
     const std::string name = entry.path().filename().string();
     if (name.rfind(prefix, 0) != 0 || entry.path().extension() != ".launch") continue;
     if (fs::file_time_type::clock::now() - fs::last_write_time(entry.path(), error) >
-        std::chrono::hours(24)) {
+        std::chrono::hours(1)) {
       fs::remove(entry.path(), error);
     }
   }
@@ -164,19 +230,12 @@ Experiment checkedExperiment(const std::string& config, std::vector<std::string>
   return experiment;
 }
 
-// what is beside the settings, taken out of the assignments; true: record a bag
-bool takeRecord(std::vector<std::string>& assignments) {
-  const bool record = takeFlag(assignments, "record", false);
-  for (const char* key : {"rviz", "view", "hold", "agents"}) takeFlag(assignments, key, false);
-  return record;
-}
-
 int check(const std::vector<std::string>& words) {
   if (words.size() < 2)
     throw Error("--check needs LAUNCH_FILE and CONFIG; see prepare_run --help.");
   std::vector<std::string> assignments = readAssignments(pmeta_nodes::handedOn(
       {words.begin() + 2, words.end()}, pmeta_nodes::readLaunchFile(words[0])));
-  takeRecord(assignments);
+  takeLaunch(assignments);
   const Experiment experiment = checkedExperiment(words[1], assignments);
   std::cout << experiment.runDir() << "\n" << experiment.totalTasks() << "\n";
   return 0;
@@ -189,15 +248,16 @@ int prepare(std::vector<std::string> words) {
   words.erase(words.begin(), words.begin() + 2);
 
   std::vector<std::string> assignments = readAssignments(words);
-  const bool record = takeRecord(assignments);
+  const Launch launch = takeLaunch(assignments);
   const Experiment experiment = checkedExperiment(config, assignments);
+  requireFreeNames(experiment, launch);
   for (const std::string& note : experiment.notes()) std::cerr << "pmeta: " << note << "\n";
   std::cerr << "settings\n" << experiment.table();
 
   std::error_code error;
   std::filesystem::create_directories(launch_file.parent_path(), error);
   removeOldLaunchFiles(launch_file);
-  pmeta::writeFileAtomically(launch_file.string(), agentsLaunch(experiment, record));
+  pmeta::writeFileAtomically(launch_file.string(), agentsLaunch(experiment, launch));
   std::cout << experiment.yaml();
   return 0;
 }

@@ -1,10 +1,15 @@
-// run_guard: the launch's required node. It ends when the run has ended, and so ends the launch;
-// all other nodes may die and be started again.
+// run_guard: the launch's required node. When the run has ended it ends the launch; all other nodes
+// may die and be started again.
 #include <pmeta_msgs/RoundSummary.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
 
 #include "conversions.h"
+#include "launch_parent.h"
 #include "node_main.h"
 
 namespace {
@@ -12,22 +17,37 @@ namespace {
 using pmeta_msgs::RoundSummary;
 
 constexpr char kHelp[] =
-    R"(run_guard: ends when the run has ended. As the launch's required node it ends the launch with it, while
-the aggregator and the agents may die and be started again.
+    R"(run_guard: ends the launch when the run has ended, by the signal that Ctrl-C would send. The aggregator
+and the agents may die and be started again.
 
   rosrun pmeta_nodes run_guard __ns:=/pmeta
 
 private parameters
   ~hold         stay until stopped (default false)
+  ~read_launch  launch file to delete, since it has been read; none by default
 subscribes   round
 Exit code 0 if the run has finished, 1 if it was stopped before its last round.
 )";
 
 // for the last messages to reach everybody first
 constexpr double kFarewell = 0.5;
+// for roslaunch to stop its nodes, this one among them
+constexpr double kLaunchEnd = 60;
+
+// A required node that ends by itself looks like an accident in roslaunch's output.
+void endLaunch() {
+  if (pmeta_nodes::launchCommand().empty()) return;
+  kill(getppid(), SIGINT);
+  const ros::WallTime limit = ros::WallTime::now() + ros::WallDuration(kLaunchEnd);
+  while (!pmeta_nodes::stopRequested() && ros::WallTime::now() < limit) {
+    ros::WallDuration(0.05).sleep();
+  }
+}
 
 int guard(const pmeta::Experiment& experiment) {
   const bool hold = ros::NodeHandle("~").param("hold", false);
+  const std::string read = ros::NodeHandle("~").param("read_launch", std::string());
+  if (!read.empty()) std::remove(read.c_str());
   const std::string run_id = experiment.settings().run_id;
   const pmeta::Authenticator authenticator(experiment.settings().key_file);
   int code = -1;
@@ -53,6 +73,7 @@ int guard(const pmeta::Experiment& experiment) {
     told = true;
   }
   ros::WallDuration(kFarewell).sleep();
+  if (!pmeta_nodes::stopRequested()) endLaunch();
   return code == 1 ? 1 : 0;
 }
 

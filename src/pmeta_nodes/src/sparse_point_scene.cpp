@@ -217,8 +217,10 @@ void SparsePointScene::drawMoving(const PolicyView& view, int task, int policy, 
                                        }));
   std::string text;
   if (shown) {
-    text =
-        reached >= 0 ? "goal at step " + std::to_string(reached) : "step " + std::to_string(step);
+    const bool ended = step == numSteps(*view.episode);
+    text = reached >= 0 ? "goal at step " + std::to_string(reached)
+           : ended      ? "goal not reached by step " + std::to_string(step)
+                        : "step " + std::to_string(step);
   }
   const double x = cards_.isTest(task) ? 0 : (is_meta ? 0.5 : -0.5) * kRight;
   scene.markers.push_back(textMarker(planeFrame(task), "steps", policyId(task, policy),

@@ -24,23 +24,6 @@ constexpr double kAggregatorWait = 5.0;
 // one would do, but a forged one behind it must not push it out
 constexpr std::uint32_t kMetaPolicies = 8;
 
-const char* stateName(std::uint8_t state) {
-  switch (state) {
-    case AgentStatus::WAITING:
-      return "waiting";
-    case AgentStatus::TRAINING:
-      return "training";
-    case AgentStatus::EVALUATING:
-      return "evaluating";
-    case AgentStatus::DONE:
-      return "done";
-    case AgentStatus::FAILED:
-      return "failed";
-    default:
-      return "unknown";
-  }
-}
-
 }  // namespace
 
 TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task, bool resume)
@@ -57,7 +40,14 @@ TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task, bool
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
   const std::string trajectory = "task_" + std::to_string(task) + "/trajectory";
   auxiliary_pub_ = nh_.advertise<pmeta_msgs::AuxiliaryUpdate>("auxiliary", 4);
-  returns_pub_ = nh_.advertise<pmeta_msgs::TaskReturn>("returns", 16, true);
+  // latching would keep only the last one for late viewers: they get both policies', of two rounds
+  returns_pub_ = nh_.advertise<pmeta_msgs::TaskReturn>(
+      "returns", 16, [this](const ros::SingleSubscriberPublisher& viewer) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        for (const auto& recent : recent_returns_) {
+          for (const auto& result : recent.second.all()) viewer.publish(*result);
+        }
+      });
   status_pub_ = nh_.advertise<AgentStatus>("agent_status", 4, true);
   if (experiment.settings().publish_trajectories) {
     // latching would keep only the last policy's episode for late viewers: they get both
@@ -207,14 +197,15 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     status_.update = 0;
   }
   setState(AgentStatus::TRAINING, "training round " + std::to_string(round));
-  const Clock::time_point start = Clock::now();
+  if (!round_end_) round_end_ = Clock::now();
   auto result = agent_.trainRound(meta, [this](int done) {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.update = static_cast<std::uint32_t>(done);
     return !stop_;
   });
   if (!result) return;
-  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  const Clock::time_point before = *std::exchange(round_end_, Clock::now());
+  const double seconds = std::chrono::duration<double>(*round_end_ - before).count();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.env_steps_per_s = static_cast<double>(result->env_steps) / seconds;
@@ -299,6 +290,7 @@ void TaskAgentNode::deliver(const pmeta::TaskReturn& result) {
   sign(authenticator_, msg);
   returns_pub_.publish(msg);
   const std::lock_guard<std::mutex> lock(mutex_);
+  recent_returns_[result.policy].take(boost::make_shared<const pmeta_msgs::TaskReturn>(msg));
   unconfirmed_returns_.push_back(std::move(msg));
   resend_wait_ = kFirstResend;
   next_resend_ = Clock::now() + resend_wait_;
@@ -346,6 +338,7 @@ void TaskAgentNode::setState(std::uint8_t state, const std::string& message) {
 void TaskAgentNode::publishStatus() {
   const std::lock_guard<std::mutex> lock(mutex_);
   status_.header.stamp = ros::Time::now();
+  status_.state_name = stateName(status_);
   status_pub_.publish(status_);
 }
 
@@ -356,7 +349,7 @@ HealthReport TaskAgentNode::health() {
                  : !checkpoint_trouble_.empty()       ? HealthReport::kWarn
                                                       : HealthReport::kOk;
   report.summary = checkpoint_trouble_.empty() ? status_.message : checkpoint_trouble_;
-  report.values = {{"state", stateName(status_.state)},
+  report.values = {{"state", stateName(status_)},
                    {"round", std::to_string(status_.round)},
                    {"updates/s", pmeta::formatNumber(status_.updates_per_s)},
                    {"env steps/s", pmeta::formatNumber(status_.env_steps_per_s)},

@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -23,6 +24,7 @@
 #include "pmeta_core/run/checkpoint.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/task_agent.h"
+#include "recent_returns.h"
 #include "refusals.h"
 
 namespace pmeta_nodes {
@@ -68,9 +70,10 @@ class TaskAgentNode {
 
   const pmeta::Experiment& experiment_;
   const bool resume_;
-  pmeta::TaskAgent agent_;  ///< the trainer's, as are the two below
+  pmeta::TaskAgent agent_;  ///< the trainer's, as are the three below
   pmeta::CheckpointFolder checkpoints_;
   int saved_round_ = 0;
+  std::optional<Clock::time_point> round_end_;  ///< of the last round that was trained
   const pmeta::Authenticator authenticator_;
   ros::NodeHandle nh_;
   ros::Publisher auxiliary_pub_;
@@ -95,6 +98,7 @@ class TaskAgentNode {
   std::vector<pmeta_msgs::TaskReturn> unconfirmed_returns_;
   std::vector<pmeta_msgs::AuxiliaryUpdate> unconfirmed_updates_;
   std::map<pmeta::Policy, pmeta_msgs::Trajectory> last_episodes_;
+  std::map<pmeta::Policy, RecentReturns> recent_returns_;
   Clock::time_point next_resend_;
   std::chrono::seconds resend_wait_{2};
   int newest_round_ = -1;

@@ -1,6 +1,7 @@
 #include "trajectory_view.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace pmeta_nodes {
 namespace {
@@ -42,6 +43,8 @@ TrajectoryView::TrajectoryView(ros::NodeHandle nh, ros::NodeHandle private_nh,
   content_.has_meta = experiment.evaluatesMeta();
   content_.tasks.resize(num_tasks);
   playbacks_.assign(num_tasks, Playback(scene_->stepSeconds()));
+  personal_returns_.resize(num_tasks);
+  meta_returns_.resize(num_tasks);
 
   frames_.sendTransform(scene_->frames());
   markers_ = nh.advertise<visualization_msgs::MarkerArray>("markers", 1, true);
@@ -84,6 +87,15 @@ void TrajectoryView::onTrajectory(const Trajectory::ConstPtr& trajectory) {
                       problem.c_str());
     return;
   }
+  const TaskView& task = content_.tasks[trajectory->task];
+  const bool is_meta = trajectory->policy == Trajectory::META;
+  const bool early = content_.summary && content_.summary->run_id == trajectory->run_id &&
+                     trajectory->round > content_.summary->round;
+  // better an early one than none
+  if (early && (is_meta ? task.meta : task.personal).episode) {
+    early_episodes_[{trajectory->task, trajectory->policy}] = trajectory;
+    return;
+  }
   if (playbacks_[trajectory->task].offer(trajectory)) takeShown(trajectory->task);
 }
 
@@ -95,15 +107,8 @@ void TrajectoryView::onReturn(const TaskReturn::ConstPtr& result) {
                       result->policy);
     return;
   }
-  TaskView& task = content_.tasks[result->task];
-  TaskReturn::ConstPtr& kept = is_meta ? task.meta.result : task.personal.result;
-  // of a meta-policy's returns in a round, the one after most exploration counts
-  if (kept && kept->run_id == result->run_id && kept->round == result->round &&
-      kept->context_episodes > result->context_episodes) {
-    return;
-  }
-  kept = result;
-  changed_ = true;
+  (is_meta ? meta_returns_ : personal_returns_)[result->task].take(result);
+  showReturns(result->task);
 }
 
 void TrajectoryView::onRound(const RoundSummary::ConstPtr& summary) {
@@ -111,7 +116,16 @@ void TrajectoryView::onRound(const RoundSummary::ConstPtr& summary) {
     forgetOtherRuns(summary->run_id);
   }
   content_.summary = summary;
-  changed_ = true;
+  for (std::size_t task = 0; task < content_.tasks.size(); ++task) showReturns(task);
+  for (auto it = early_episodes_.begin(); it != early_episodes_.end();) {
+    const Trajectory::ConstPtr episode = it->second;
+    if (episode->round > summary->round) {
+      ++it;
+      continue;
+    }
+    it = early_episodes_.erase(it);
+    if (playbacks_[episode->task].offer(episode)) takeShown(episode->task);
+  }
 }
 
 void TrajectoryView::redraw(const ros::WallTimerEvent&) {
@@ -133,6 +147,14 @@ void TrajectoryView::play(const ros::WallTimerEvent&) {
   moving_markers_.publish(scene_->moving(content_, seconds));
 }
 
+void TrajectoryView::showReturns(std::size_t task) {
+  const std::uint32_t round =
+      content_.summary ? content_.summary->round : std::numeric_limits<std::uint32_t>::max();
+  content_.tasks[task].personal.result = personal_returns_[task].upTo(round);
+  content_.tasks[task].meta.result = meta_returns_[task].upTo(round);
+  changed_ = true;
+}
+
 /// Brings the content up to the task's playback.
 void TrajectoryView::takeShown(std::size_t task) {
   content_.tasks[task].personal.episode = playbacks_[task].personal();
@@ -141,12 +163,14 @@ void TrajectoryView::takeShown(std::size_t task) {
 }
 
 void TrajectoryView::forgetOtherRuns(const std::string& run_id) {
+  for (auto it = early_episodes_.begin(); it != early_episodes_.end();) {
+    it = it->second->run_id == run_id ? std::next(it) : early_episodes_.erase(it);
+  }
   for (std::size_t task = 0; task < content_.tasks.size(); ++task) {
     playbacks_[task].forgetOtherRuns(run_id);
     takeShown(task);
-    for (PolicyView* view : {&content_.tasks[task].personal, &content_.tasks[task].meta}) {
-      if (view->result && view->result->run_id != run_id) view->result.reset();
-    }
+    personal_returns_[task].forgetOtherRuns(run_id);
+    meta_returns_[task].forgetOtherRuns(run_id);
   }
 }
 

@@ -51,12 +51,11 @@ TEST(Format, CountsHaveThreeDigitsAndAUnit) {
 }
 
 TEST(Format, DurationsAreInSecondsMinutesOrHours) {
-  EXPECT_EQ(duration(0), "0.0 s");
-  EXPECT_EQ(duration(4.21), "4.2 s");
-  EXPECT_EQ(duration(10), "0:10 min");
-  EXPECT_EQ(duration(65.4), "1:05 min");
-  EXPECT_EQ(duration(3599.6), "1:00 h");
-  EXPECT_EQ(duration(7380), "2:03 h");
+  EXPECT_EQ(duration(0), "0:00:00");
+  EXPECT_EQ(duration(4.21), "0:00:04");
+  EXPECT_EQ(duration(65.4), "0:01:05");
+  EXPECT_EQ(duration(3599.6), "1:00:00");
+  EXPECT_EQ(duration(360007), "100:00:07");
   EXPECT_EQ(duration(kNan), "-");
 }
 
@@ -76,10 +75,18 @@ struct Comma : std::numpunct<char> {
 
 TEST(Format, ShowsStrangersTextWithoutObeyingIt) {
   EXPECT_EQ(shown("grid_4x4"), "'grid_4x4'");
-  EXPECT_EQ(shown("a\x1b[31mb\n\x7f"), "'a?[31mb?" "?'");
+  EXPECT_EQ(shown("a\x1b[31mb\n\x7f"),
+            "'a?[31mb?"
+            "?'");
   EXPECT_EQ(shown("caf\xc3\xa9 \xe6\x97\xa5"), "'caf\xc3\xa9 \xe6\x97\xa5'");
-  EXPECT_EQ(shown("\xc2\x9b" "31m"), "'?31m'") << "U+009B begins a sequence as ESC [ does";
-  EXPECT_EQ(shown("a\xff" "b\xc0\xaf"), "'a?b?" "?'");
+  EXPECT_EQ(shown("\xc2\x9b"
+                  "31m"),
+            "'?31m'")
+      << "U+009B begins a sequence as ESC [ does";
+  EXPECT_EQ(shown("a\xff"
+                  "b\xc0\xaf"),
+            "'a?b?"
+            "?'");
   EXPECT_EQ(shown(std::string(60, 'x')), "'" + std::string(60, 'x') + "'");
   EXPECT_EQ(shown(std::string(10000000, 'x')), "'" + std::string(60, 'x') + "...'");
   EXPECT_EQ(shown(std::string(59, 'x') + "\xc3\xa9"), "'" + std::string(59, 'x') + "...'");

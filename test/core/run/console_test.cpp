@@ -66,7 +66,7 @@ TEST(ProgressBar, FillsFromLeftToRight) {
 TEST(RunConsole, ATerminalHasALineWithABarForEveryEvaluatedRound) {
   RunConsole console(twoTasks(), true);
   EXPECT_EQ(console.take(roundOf(1, -3.5, -4.25)),
-            "[                    ] round  1/40  PP -3.50  MP -4.25  100 steps/s  ETA 1:05 min");
+            "[                    ] round  1/40  PP -3.50  MP -4.25  100 steps/s  ETA 0:01:05");
   EXPECT_EQ(console.take(roundOf(20, -2, -3)).substr(0, 34), "[=========>          ] round 20/40");
   EXPECT_EQ(console.take(roundOf(40, -2, -3)).substr(0, 34), "[====================] round 40/40");
 }
@@ -80,19 +80,33 @@ TEST(RunConsole, SpeedCountsTheRoundsBetweenEvaluationsToo) {
   EXPECT_NE(console.take(roundOf(4, 0, 0, 1)).find("  200 steps/s"), std::string::npos);
 }
 
-TEST(RunConsole, WithoutATerminalThereAreTenLinesAtMostAndTheLastRoundIsOne) {
+TEST(RunConsole, WithoutATerminalARunHasTenLinesAndTheLastRoundIsOne) {
   RunConsole console(twoTasks(), false);
   std::vector<std::string> lines;
   for (int round = 1; round <= 40; ++round) {
-    const std::string line = console.take(roundOf(round, round, -round));
+    const std::string line = console.take(roundOf(round, round, -round, 2));
     if (!line.empty()) lines.push_back(line);
   }
   ASSERT_EQ(lines.size(), 10u);
-  EXPECT_EQ(lines.front(), "round  4/40  PP 4.00  MP -4.00  100 steps/s  ETA 1:05 min");
-  EXPECT_EQ(lines.back(), "round 40/40  PP 40.00  MP -40.00  100 steps/s  ETA 1:05 min");
+  EXPECT_EQ(lines.front(), "round  4/40  PP 4.00  MP -4.00  100 steps/s  ETA 0:01:05");
+  EXPECT_EQ(lines.back(), "round 40/40  PP 40.00  MP -40.00  100 steps/s  ETA 0:01:05");
 
   RunConsole few(gridExperiment({"sizes:=[4, 5]", "rounds:=3"}), false);
   for (int round = 1; round <= 3; ++round) EXPECT_NE(few.take(roundOf(round, 0, 0)), "");
+}
+
+TEST(RunConsole, TenSecondsOfRoundsWithoutALineBringOne) {
+  for (const bool terminal : {false, true}) {
+    RunConsole console(twoTasks(), terminal);
+    std::string rounds;
+    for (int round = 1; round <= 9; ++round) {
+      const std::string line = console.take(unevaluated(round, round < 8 ? 4 : 60));
+      if (!line.empty()) rounds += line.substr(line.find("round")) + "\n";
+    }
+    EXPECT_EQ(rounds,
+              "round  3/40  ETA 0:01:05\nround  6/40  ETA 0:01:05\n"
+              "round  8/40  ETA 0:01:05\nround  9/40  ETA 0:01:05\n");
+  }
 }
 
 TEST(RunConsole, TheTableHasLastAndBestOfEveryTask) {

@@ -77,10 +77,9 @@ std::string shortCount(double value) {
 
 std::string duration(double seconds) {
   if (!std::isfinite(seconds)) return "-";
-  if (seconds < 10) return fixed(seconds, 1) + " s";
   const long whole = std::lround(seconds);
-  if (whole < 3600) return std::to_string(whole / 60) + ":" + twoDigits(whole % 60) + " min";
-  return std::to_string(whole / 3600) + ":" + twoDigits(whole / 60 % 60) + " h";
+  return std::to_string(whole / 3600) + ":" + twoDigits(whole / 60 % 60) + ":" +
+         twoDigits(whole % 60);
 }
 
 bool isPlainText(const std::string& text) {

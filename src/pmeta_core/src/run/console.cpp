@@ -10,6 +10,7 @@ namespace pmeta {
 namespace {
 
 constexpr int kBarWidth = 20;
+constexpr double kLongestSilence = 10;  // seconds
 constexpr std::size_t kNumberWidth = 11;
 constexpr std::size_t kBestWidth = 20;
 const char* const kMean = "mean";
@@ -19,6 +20,8 @@ std::string bestText(double best, int round) {
   if (std::isnan(best)) return "-";
   return shortNumber(best) + padded("(" + std::to_string(round) + ")", 8, true);
 }
+
+int tenths(int round, int rounds) { return static_cast<int>(10LL * round / rounds); }
 
 std::string bytesText(double bytes) {
   if (bytes < 999.5) return significant(bytes, 3) + " B";
@@ -69,29 +72,40 @@ void RunConsole::takeRows(const RoundBook::Round& round) {
   test_.add(summary.test_return, summary.round);
 }
 
+bool RunConsole::isDue(const RoundBook::Round& round) const {
+  if (silence_ >= kLongestSilence) return true;
+  if (round.rows.empty()) return false;
+  return terminal_ || tenths(round.summary.round, rounds_) != printed_tenths_;
+}
+
 std::string RunConsole::take(const RoundBook::Round& round) {
   const RoundSummary& summary = round.summary;
   seconds_ += summary.seconds;
-  if (round.rows.empty()) return "";
-  evaluated_ = true;
-  takeRows(round);
-  const double speed = seconds_ > 0 ? static_cast<double>(steps_) / seconds_
-                                    : std::numeric_limits<double>::quiet_NaN();
-  seconds_ = 0;
-  steps_ = 0;
-
-  const int tenths = static_cast<int>(10LL * summary.round / rounds_);
-  if (!terminal_ && tenths == printed_tenths_) return "";
-  printed_tenths_ = tenths;
+  silence_ += summary.seconds;
+  const bool due = isDue(round);
+  if (due) {
+    silence_ = 0;
+    printed_tenths_ = tenths(summary.round, rounds_);
+  }
   const std::string all = std::to_string(rounds_);
   const std::string bar = terminal_ ? progressBar(summary.round, rounds_, kBarWidth) + " " : "";
   std::string line = bar + "round " + padded(std::to_string(summary.round), all.size(), true);
-  line += "/" + all + "  PP " + shortNumber(summary.personal_return) + "  MP " +
-          shortNumber(summary.meta_return);
-  if (num_tasks_ < static_cast<int>(tasks_.size())) {
-    line += "  test " + shortNumber(summary.test_return);
+  line += "/" + all;
+  if (!round.rows.empty()) {
+    evaluated_ = true;
+    takeRows(round);
+    line +=
+        "  PP " + shortNumber(summary.personal_return) + "  MP " + shortNumber(summary.meta_return);
+    if (num_tasks_ < static_cast<int>(tasks_.size())) {
+      line += "  test " + shortNumber(summary.test_return);
+    }
+    const double speed = seconds_ > 0 ? static_cast<double>(steps_) / seconds_
+                                      : std::numeric_limits<double>::quiet_NaN();
+    line += "  " + shortCount(speed) + " steps/s";
+    seconds_ = 0;
+    steps_ = 0;
   }
-  return line + "  " + shortCount(speed) + " steps/s  ETA " + duration(summary.eta_seconds);
+  return due ? line + "  ETA " + duration(summary.eta_seconds) : "";
 }
 
 std::string RunConsole::tableLine(const std::string& name, const Courses& courses,

@@ -20,11 +20,11 @@ constexpr std::uint32_t kManyAgents = 256;
 std::string serviceOf(Request request) {
   switch (request) {
     case Request::kEvaluate:
-      return "/pmeta/evaluate";
+      return ros::names::resolve("pmeta/evaluate");
     case Request::kCheckpoint:
-      return "/pmeta/save_checkpoint";
+      return ros::names::resolve("pmeta/save_checkpoint");
     default:
-      return "/pmeta/pause";
+      return ros::names::resolve("pmeta/pause");
   }
 }
 
@@ -77,9 +77,9 @@ void RunMonitor::subscribe() {
         }
         tell();
       };
-  round_sub_ = nh_.subscribe<RoundSummary>("/pmeta/round", 1, on_round);
-  returns_sub_ = nh_.subscribe<TaskReturn>("/pmeta/returns", kManyAgents, on_return);
-  status_sub_ = nh_.subscribe<AgentStatus>("/pmeta/agent_status", kManyAgents, on_status);
+  round_sub_ = nh_.subscribe<RoundSummary>("pmeta/round", 1, on_round);
+  returns_sub_ = nh_.subscribe<TaskReturn>("pmeta/returns", kManyAgents, on_return);
+  status_sub_ = nh_.subscribe<AgentStatus>("pmeta/agent_status", kManyAgents, on_status);
 }
 
 void RunMonitor::tell() {

@@ -19,7 +19,7 @@
 
 namespace pmeta_nodes {
 
-/// What a user can ask of a run, each by a service below /pmeta.
+/// What a user can ask of a run, each by a service below pmeta in rviz's own namespace.
 enum class Request {
   kPause,       ///< pause (std_srvs/SetBool) with true
   kResume,      ///< pause with false
@@ -30,7 +30,7 @@ enum class Request {
 /// The full name of the request's service.
 std::string serviceOf(Request request);
 
-/// Follows the run on /pmeta for a GUI that must never wait for ROS.
+/// Follows the run below pmeta, in rviz's own namespace, for a GUI that must never wait for ROS.
 ///
 /// Subscriptions have a callback queue and a thread of their own; services are looked for and
 /// called in another one. Methods and slots are for the GUI's thread; signals reach it through its

@@ -1,18 +1,26 @@
 #include "panel/run_panel.h"
 
+#include <rviz/view_controller.h>
+#include <rviz/view_manager.h>
+#include <rviz/visualization_manager.h>
+#include <rviz/window_manager_interface.h>
 #include <QGridLayout>
 #include <QHBoxLayout>
 #include <QHeaderView>
 #include <QLabel>
+#include <QMainWindow>
 #include <QProgressBar>
 #include <QPushButton>
+#include <QResizeEvent>
 #include <QTableWidget>
 #include <QVBoxLayout>
 #include <pluginlib/class_list_macros.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include "pmeta_core/base/format.h"
+#include "scene.h"
 
 namespace pmeta_nodes {
 namespace {
@@ -20,6 +28,9 @@ namespace {
 constexpr int kWidth = 400;           // px, to begin with
 constexpr int kRefreshAfter = 100;    // ms
 constexpr int kClockInterval = 1000;  // ms
+
+const char* const kFlatView = "rviz/TopDownOrtho";
+constexpr double kMargin = 0.3;  // around the scene, in its units
 
 // as in the scene
 const char* const kPersonalStyle = "color: #d81b60; font-weight: bold";
@@ -169,6 +180,28 @@ void RunPanel::follow() {
   });
 }
 
+void RunPanel::onInitialize() {
+  rviz::WindowManagerInterface* manager = vis_manager_->getWindowManager();
+  auto* window =
+      manager == nullptr ? nullptr : qobject_cast<QMainWindow*>(manager->getParentWindow());
+  if (window == nullptr || window->centralWidget() == nullptr) return;
+  window->centralWidget()->installEventFilter(this);
+  fitView(window->centralWidget()->size());
+}
+
+bool RunPanel::eventFilter(QObject* watched, QEvent* event) {
+  if (event->type() == QEvent::Resize) fitView(static_cast<QResizeEvent*>(event)->size());
+  return rviz::Panel::eventFilter(watched, event);
+}
+
+void RunPanel::fitView(const QSize& window) {
+  rviz::ViewController* view = vis_manager_->getViewManager()->getCurrent();
+  if (view == nullptr || view->getClassId() != kFlatView) return;
+  // in pixels for a unit of the scene
+  view->subProp("Scale")->setValue(std::min(window.width() / (kSceneWidth + kMargin),
+                                            window.height() / (kSceneHeight + kMargin)));
+}
+
 void RunPanel::refresh() {
   const RunState state = monitor_->takeState();
   showSummary(state);
@@ -207,12 +240,13 @@ void RunPanel::showTasks(const RunState& state) {
   const auto now = std::chrono::steady_clock::now();
   const int rows = static_cast<int>(state.tasks.size());
   if (tasks_->rowCount() != rows) tasks_->setRowCount(rows);
+  tasks_->horizontalHeaderItem(kTask)->setText(text(state.tableText()));
   int row = 0;
   for (const auto& [index, task] : state.tasks) {
     const QString tip = text("task " + std::to_string(index) + ", " + task.name);
     setCell(tasks_, row, kTask, text(task.name), tip + (task.is_test ? ", a test task" : ""));
-    setCell(tasks_, row, kPersonal, number(task.personal.mean));
-    setCell(tasks_, row, kMeta, number(task.meta.mean));
+    setCell(tasks_, row, kPersonal, number(state.shown(task.personal).mean));
+    setCell(tasks_, row, kMeta, number(state.shown(task.meta).mean));
     setCell(tasks_, row, kAgent, text(state.agentText(task, now)),
             task.status ? text(task.status->message) : QString());
     setCell(tasks_, row, kSpeed,

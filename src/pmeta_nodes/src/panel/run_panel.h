@@ -16,7 +16,8 @@ class QTableWidget;
 namespace pmeta_nodes {
 
 /// The rviz panel of a run: where it stands, its returns task by task, what its agents do, and
-/// buttons for what its nodes offer as services. Shows /pmeta; only looks on until a button is
+/// buttons for what its nodes offer as services. Shows the run below pmeta in rviz's
+/// own namespace; only looks on until a button is
 /// used.
 class RunPanel : public rviz::Panel {
   Q_OBJECT
@@ -24,7 +25,12 @@ class RunPanel : public rviz::Panel {
  public:
   explicit RunPanel(QWidget* parent = nullptr);
 
+  /// Keeps the scene as large as the window allows.
+  void onInitialize() override;
+  bool eventFilter(QObject* watched, QEvent* event) override;
+
  private:
+  void fitView(const QSize& window);
   void build();
   QLabel* addLabel(const QString& name, const QString& style);
   QPushButton* addButton(const QString& name, const QString& text);

@@ -1,5 +1,8 @@
 #include "panel/run_state.h"
 
+#include <boost/make_shared.hpp>
+
+#include <algorithm>
 #include <vector>
 
 #include "pmeta_core/base/format.h"
@@ -45,11 +48,8 @@ void RunState::take(const TaskReturn& message) {
   TaskState* task = taskOf(message.task, message.run_id, message.task_name);
   if (task == nullptr) return;
   task->is_test = message.split == TaskReturn::TEST;
-  NewestReturn& newest = message.policy == TaskReturn::META ? task->meta : task->personal;
-  const bool newer =
-      message.round > newest.round ||
-      (message.round == newest.round && message.context_episodes >= newest.context_episodes);
-  if (newer) newest = {message.return_mean, message.round, message.context_episodes};
+  (message.policy == TaskReturn::META ? task->meta : task->personal)
+      .take(boost::make_shared<const TaskReturn>(message));
 }
 
 void RunState::take(const AgentStatus& message, std::chrono::steady_clock::time_point now) {
@@ -88,6 +88,28 @@ std::string RunState::messageText() const {
     return "the aggregator has gone before its last round: see the terminal of ./pmeta run";
   }
   return summary->message;
+}
+
+ShownReturn RunState::shown(const RecentReturns& returns) const {
+  const auto result =
+      returns.upTo(summary ? summary->round : std::numeric_limits<std::uint32_t>::max());
+  return result ? ShownReturn{result->return_mean, result->round} : ShownReturn();
+}
+
+std::string RunState::tableText() const {
+  std::uint32_t first = std::numeric_limits<std::uint32_t>::max();
+  std::uint32_t last = 0;
+  for (const auto& task : tasks) {
+    for (const RecentReturns* returns : {&task.second.personal, &task.second.meta}) {
+      const std::uint32_t round = shown(*returns).round;
+      if (round == 0) continue;
+      first = std::min(first, round);
+      last = std::max(last, round);
+    }
+  }
+  if (last == 0) return "task";
+  if (first == last) return "task, round " + std::to_string(last);
+  return "task, rounds " + std::to_string(first) + " to " + std::to_string(last);
 }
 
 std::string RunState::roundText() const {

@@ -11,13 +11,14 @@
 #include <optional>
 #include <string>
 
+#include "recent_returns.h"
+
 namespace pmeta_nodes {
 
-/// The newest return of a policy on a task.
-struct NewestReturn {
+/// A return as the panel shows it.
+struct ShownReturn {
   double mean = std::numeric_limits<double>::quiet_NaN();
   std::uint32_t round = 0;
-  std::uint32_t context_episodes = 0;
 };
 
 /// What is known of a task and its agent.
@@ -25,8 +26,8 @@ struct TaskState {
   std::string run_id;
   std::string name;
   bool is_test = false;
-  NewestReturn personal;
-  NewestReturn meta;  ///< after adaptation, where there are several
+  RecentReturns personal;
+  RecentReturns meta;
   std::optional<pmeta_msgs::AgentStatus> status;
   std::chrono::steady_clock::time_point heard;  ///< when the status came
 };
@@ -53,6 +54,9 @@ struct RunState {
   std::string stateText() const;
   /// The summary's message, or what to do where there is no run.
   std::string messageText() const;
+  /// The policy's mean return as of the last complete round, and its round; NaN and 0 if none.
+  ShownReturn shown(const RecentReturns& returns) const;
+  std::string tableText() const;    ///< "task, round 12"; "task, rounds 8 to 12" where they differ
   std::string roundText() const;    ///< "round 12 of 40"
   std::string etaText() const;      ///< "1:05 min"; "-" where nothing is known
   std::string missingText() const;  ///< "missing: 0 grid_4x4, 3 grid_7x7"; "" if nobody is

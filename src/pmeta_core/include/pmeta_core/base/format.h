@@ -18,7 +18,7 @@ std::string significant(double value, int digits);
 /// where there is no number.
 std::string shortCount(double value);
 
-/// "4.2 s", "1:05 min" or "2:03 h"; "-" where there is no number.
+/// Hours, minutes and seconds, "0:01:05"; "-" where there is no number. Not of negative numbers.
 std::string duration(double seconds);
 
 /// Is it UTF-8 without control characters, as names must be?

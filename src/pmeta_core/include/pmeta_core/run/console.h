@@ -15,13 +15,15 @@ namespace pmeta {
 /// only; whoever has the console prints it.
 class RunConsole {
  public:
-  /// terminal: somebody watches. Then every evaluated round has a line, with a bar; else ten lines
-  /// or less in all, spread over the run, and no bar.
+  /// terminal: somebody watches. Then every evaluated round has a line, with a bar; else there are
+  /// ten lines spread over the run, and no bar. Either way, ten seconds of rounds without a line
+  /// bring one.
   RunConsole(const Experiment& experiment, bool terminal);
 
   /// Takes a round's record and gives its line without a newline: round, PP, MP, return on test
-  /// tasks, environment steps a second since the last evaluated round, and the time left. "" if the
-  /// round is not evaluated or, without a terminal, not due. Rounds come in order.
+  /// tasks, environment steps a second since the last evaluated round, and the time left; of a
+  /// round that is not evaluated, the first and the last of these. "" if none is due. Rounds come
+  /// in order.
   std::string take(const RoundBook::Round& round);
 
   /// PP and MP of every task and their means: of the last evaluated round, and the best with its
@@ -44,6 +46,7 @@ class RunConsole {
   };
 
   void takeRows(const RoundBook::Round& round);
+  bool isDue(const RoundBook::Round& round) const;
   std::string tableLine(const std::string& name, const Courses& courses, std::size_t width) const;
 
   std::vector<std::string> names_;  ///< by task
@@ -57,6 +60,7 @@ class RunConsole {
   bool evaluated_ = false;
   int printed_tenths_ = 0;
   double seconds_ = 0;      ///< of the rounds since the last evaluated one
+  double silence_ = 0;      ///< seconds of the rounds since the last line
   std::int64_t steps_ = 0;  ///< of all tasks since then
   std::vector<std::int64_t> cumulative_steps_;
 };
