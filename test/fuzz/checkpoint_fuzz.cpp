@@ -98,8 +98,9 @@ void goOnAsAgent(const SavedRun& run, const MemoryState& state) {
 void goOnAsAggregator(const SavedRun& run, const MemoryState& state) {
   MetaAggregator aggregator(run.experiment);
   test::load(aggregator, state);
-  AuxiliaryUpdate update = {run.experiment.settings().run_id, 0, aggregator.metaPolicy().round + 1,
-                            run.meta.model, 1};
+  AuxiliaryUpdate update = {
+      run.experiment.settings().run_id, 0, aggregator.metaPolicy().round + 1, run.meta.model, 1,
+      run.experiment.settingsHash()};
   const auto answer = aggregator.offer(std::make_shared<AuxiliaryUpdate>(update));
   if (answer.verdict == MetaAggregator::Verdict::kAccepted) aggregator.closeRound();
   test::stateOf(aggregator);

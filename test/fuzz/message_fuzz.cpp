@@ -95,8 +95,10 @@ environment: {name: gridworld, sizes: [2, 3], landmark: corner}
   return kExperiment;
 }
 
+// the corpus, which outlives changes of the settings, has "right" for their hash
 void offer(const pmeta_msgs::AuxiliaryUpdate& msg) {
-  const auto update = std::make_shared<const AuxiliaryUpdate>(pmeta_nodes::fromMsg(msg));
+  const auto update = std::make_shared<AuxiliaryUpdate>(pmeta_nodes::fromMsg(msg));
+  if (update->settings_hash == "right") update->settings_hash = experiment().settingsHash();
   require(pmeta_nodes::fromMsg(pmeta_nodes::toMsg(update->model)) == update->model,
           "a model changes on its way");
   MetaAggregator aggregator(experiment());

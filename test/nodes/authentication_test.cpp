@@ -42,6 +42,7 @@ class Authentication : public RunOverRos {
     rounds_.listen(nh_, "round");
     diagnostics_sub_ = nh_.subscribe("/diagnostics", 200, &Authentication::onDiagnostics, this);
     status_sub_ = nh_.subscribe("agent_status", 100, &Authentication::onStatus, this);
+    status_pub_ = nh_.advertise<pmeta_msgs::AgentStatus>("agent_status", 4);
   }
 
   // One kind of message: what was overheard of it, and what can be made of that.
@@ -240,6 +241,7 @@ class Authentication : public RunOverRos {
   Kind<pmeta_msgs::MetaPolicy> meta_policies_;
   Kind<pmeta_msgs::RoundSummary> rounds_;
   ros::Subscriber diagnostics_sub_, status_sub_;
+  ros::Publisher status_pub_;
   std::map<std::string, std::map<std::string, std::string>> health_;
   std::map<std::string, pmeta_msgs::AgentStatus> status_;
 };
@@ -273,6 +275,19 @@ TEST_F(Authentication, NothingOfAStrangersEntersTheRun) {
   }
   EXPECT_TRUE(told);
   pause(false);
+
+  // signed, but recorded before anybody of this run was there: its guard and its agents stay
+  pmeta_msgs::RoundSummary old = *summary_;
+  old.state = pmeta_msgs::RoundSummary::STOPPED;
+  old.header.stamp = ros::Time(1);
+  sign(key_, old);
+  rounds_.pub.publish(old);
+  // no agent has failed
+  pmeta_msgs::AgentStatus failure = status_["/pmeta/task_agent_0"];
+  ASSERT_EQ(failure.run_id, experiment_.settings().run_id);
+  failure.state = pmeta_msgs::AgentStatus::FAILED;
+  status_pub_.publish(failure);
+  ASSERT_TRUE(waitFor([&] { return value(aggregator_, "forged: an agent's failure") > 0; }));
 
   // while rounds pass, and then for as long as it takes
   ASSERT_TRUE(waitFor([&] {

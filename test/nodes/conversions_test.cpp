@@ -65,7 +65,7 @@ TEST(Conversions, ModelsThatAreMovedAreNotCopied) {
 }
 
 TEST(Conversions, MetaPolicyRoundTrip) {
-  const pmeta::MetaPolicy meta = {"run", 3, networkModel(), {0, 2}, true, 7, true};
+  const pmeta::MetaPolicy meta = {"run", 3, networkModel(), {0, 2}, true, 7, true, "5e77"};
   const pmeta_msgs::MetaPolicy msg = overTheWire(toMsg(meta, 10));
   EXPECT_EQ(msg.rounds, 10u);
   const pmeta::MetaPolicy back = fromMsg(msg);
@@ -73,18 +73,20 @@ TEST(Conversions, MetaPolicyRoundTrip) {
   EXPECT_EQ(back.round, 3);
   EXPECT_TRUE(back.evaluate);
   EXPECT_EQ(back.incarnation, 7u);
+  EXPECT_EQ(back.settings_hash, meta.settings_hash);
   EXPECT_TRUE(back.checkpoint);
   EXPECT_EQ(back.participants, (std::vector<int>{0, 2}));
   EXPECT_TRUE(back.model == meta.model);
 }
 
 TEST(Conversions, AuxiliaryUpdateRoundTrip) {
-  const pmeta::AuxiliaryUpdate update = {"run", 4, 9, tableModel(), 2.5};
+  const pmeta::AuxiliaryUpdate update = {"run", 4, 9, tableModel(), 2.5, "5e77"};
   const pmeta::AuxiliaryUpdate back = fromMsg(overTheWire(toMsg(update)));
   EXPECT_EQ(back.run_id, "run");
   EXPECT_EQ(back.task, 4);
   EXPECT_EQ(back.round, 9);
   EXPECT_EQ(back.weight, 2.5);
+  EXPECT_EQ(back.settings_hash, "5e77");
   EXPECT_TRUE(back.model == update.model);
 }
 
@@ -102,6 +104,7 @@ TEST(Conversions, TaskReturnRoundTrip) {
       result.episodes = 15;
       result.env_steps = 1LL << 40;
       result.updates = 30;
+      result.broken_episodes = 3;
       result.seconds = 0.125;
       result.scheduled = policy == pmeta::Policy::kMeta;
       const pmeta_msgs::TaskReturn msg = overTheWire(toMsg(result, "grid_4x4"));
@@ -117,6 +120,7 @@ TEST(Conversions, TaskReturnRoundTrip) {
       EXPECT_EQ(back.mean, result.mean);
       EXPECT_EQ(back.std, result.std);
       EXPECT_EQ(back.episodes, result.episodes);
+      EXPECT_EQ(back.broken_episodes, 3);
       EXPECT_EQ(back.env_steps, result.env_steps);
       EXPECT_EQ(back.updates, result.updates);
       EXPECT_EQ(back.seconds, result.seconds);
@@ -291,11 +295,11 @@ TEST(Conversions, StatesHaveNamesAndAStrangersNumberIsUnknown) {
 TEST(Conversions, TheMacOfAnUpdateGuardsEachField) {
   using M = pmeta_msgs::AuxiliaryUpdate;
   expectGuarded<M>(
-      toMsg(pmeta::AuxiliaryUpdate{"run", 4, 9, tableModel(), 2.5}),
+      toMsg(pmeta::AuxiliaryUpdate{"run", 4, 9, tableModel(), 2.5, "a"}),
       {[](M& m) { m.run_id = "other"; }, [](M& m) { m.task = 3; },
        [](M& m) { m.task = 0xffffffffu; }, [](M& m) { m.round = 8; }, [](M& m) { m.weight = 2; },
-       [](M& m) { m.model.layout += " "; }, [](M& m) { m.model.layout_hash ^= 1; },
-       [](M& m) { m.model.float64_values[0] = 0.2; },
+       [](M& m) { m.settings_hash = "5e77"; }, [](M& m) { m.model.layout += " "; },
+       [](M& m) { m.model.layout_hash ^= 1; }, [](M& m) { m.model.float64_values[0] = 0.2; },
        [](M& m) { m.model.float64_values.push_back(0); },
        [](M& m) { m.model.float32_values.push_back(0); }, [](M& m) { m.model.present[4] = 1; },
        [](M& m) { m.model.present.clear(); }, [](M& m) { m.model.checksum ^= 1; },
@@ -305,21 +309,23 @@ TEST(Conversions, TheMacOfAnUpdateGuardsEachField) {
 TEST(Conversions, TheMacOfAMetaPolicyGuardsEachField) {
   using M = pmeta_msgs::MetaPolicy;
   expectGuarded<M>(
-      toMsg(pmeta::MetaPolicy{"run", 3, networkModel(), {0, 2}}, 10),
+      toMsg(pmeta::MetaPolicy{"run", 3, networkModel(), {0, 2}, false, 0, false, "a"}, 10),
       {[](M& m) { m.run_id = "other"; }, [](M& m) { m.round = 4; }, [](M& m) { m.rounds = 4; },
-       [](M& m) { m.participants.pop_back(); }, [](M& m) { m.model.float32_values[5] = 8; }});
+       [](M& m) { m.settings_hash = "5e77"; }, [](M& m) { m.participants.pop_back(); },
+       [](M& m) { m.model.float32_values[5] = 8; }});
 }
 
 TEST(Conversions, TheMacOfAReturnGuardsEachField) {
   using M = pmeta_msgs::TaskReturn;
-  expectGuarded<M>(toMsg(pmeta::TaskReturn(), "grid"),
-                   {[](M& m) { m.run_id = "other"; }, [](M& m) { m.task = 1; },
-                    [](M& m) { m.task_name = "grib"; }, [](M& m) { m.round = 1; },
-                    [](M& m) { m.policy = M::META; }, [](M& m) { m.policy = 7; },
-                    [](M& m) { m.split = M::TEST; }, [](M& m) { m.context_episodes = 1; },
-                    [](M& m) { m.return_mean = 1; }, [](M& m) { m.return_std = 1; },
-                    [](M& m) { m.episodes = 1; }, [](M& m) { m.env_steps = 1; },
-                    [](M& m) { m.updates = 1; }, [](M& m) { m.wall_s = 1; }});
+  expectGuarded<M>(
+      toMsg(pmeta::TaskReturn(), "grid"),
+      {[](M& m) { m.run_id = "other"; }, [](M& m) { m.task = 1; },
+       [](M& m) { m.task_name = "grib"; }, [](M& m) { m.round = 1; },
+       [](M& m) { m.policy = M::META; }, [](M& m) { m.policy = 7; },
+       [](M& m) { m.split = M::TEST; }, [](M& m) { m.context_episodes = 1; },
+       [](M& m) { m.return_mean = 1; }, [](M& m) { m.return_std = 1; },
+       [](M& m) { m.episodes = 1; }, [](M& m) { m.env_steps = 1; }, [](M& m) { m.updates = 1; },
+       [](M& m) { m.broken_episodes = 1; }, [](M& m) { m.wall_s = 1; }});
 }
 
 TEST(Conversions, TheMacOfARoundMessageGuardsEachField) {
@@ -335,6 +341,16 @@ TEST(Conversions, TheMacOfARoundMessageGuardsEachField) {
             [](M& m) { m.test_return = 1; }, [](M& m) { m.participants = {1}; },
             [](M& m) { m.missing = {1}; }, [](M& m) { m.excluded = {1}; },
             [](M& m) { m.round_s = 1; }, [](M& m) { m.eta_s = 1; }, [](M& m) { m.refused = 1; }});
+}
+
+TEST(Conversions, TheMacOfAnAgentsStateGuardsWhatIsActedOn) {
+  using M = pmeta_msgs::AgentStatus;
+  M msg;
+  msg.run_id = "run";
+  msg.state = M::TRAINING;
+  expectGuarded<M>(msg, {[](M& m) { m.run_id = "other"; }, [](M& m) { m.task = 1; },
+                         [](M& m) { m.task = 0xffffffffu; }, [](M& m) { m.state = M::FAILED; },
+                         [](M& m) { m.message = "failed"; }, [](M& m) { m.incarnation = 1; }});
 }
 
 TEST(Mailbox, DropsTheOldestWhenFull) {

@@ -41,6 +41,20 @@ TEST(Playback, ANewEpisodeWaitsForTheEndAndTheLastOneWins) {
   EXPECT_EQ(nullptr, playback.personal());
 }
 
+TEST(Playback, ALongEpisodeKeepsANewOneWaitingForAMinuteAtMost) {
+  Playback playback(0.1);
+  const auto last = episode(Trajectory::META, 20);
+  playback.offer(episode(Trajectory::PERSONAL, 50000));
+  EXPECT_FALSE(playback.advance(1000)) << "nobody waits";
+  playback.offer(last);
+  playback.offer(episode(Trajectory::PERSONAL, 10));
+  EXPECT_FALSE(playback.advance(Playback::kLongestWait - 1));
+  EXPECT_TRUE(playback.advance(1));
+  EXPECT_EQ(10u, playback.personal()->rewards.size());
+  EXPECT_EQ(last, playback.meta());
+  EXPECT_EQ(0, playback.seconds());
+}
+
 TEST(Playback, WithoutPlayingANewEpisodeIsShownAtOnce) {
   Playback playback(0);
   const auto last = episode(Trajectory::PERSONAL, 2);

@@ -137,11 +137,19 @@ TEST_F(PolicyNodeTest, SaysInOneSentenceWhatIsWrong) {
   const std::string text = output(
       "{ rosrun pmeta_nodes policy_node --help;"
       " rosrun pmeta_nodes policy_node __name:=a & rosrun pmeta_nodes policy_node __name:=b "
-      "_policy:=/none; wait; }");
+      "_policy:=/none & rosrun pmeta_nodes policy_node __name:=c _policy:=/none _task:=abc & "
+      "rosrun pmeta_nodes policy_node __name:=d _task:=7 _policy:=" +
+      experiment_.runDir() + "/policies/task_0.safetensors" + "; wait; }");
   EXPECT_EQ(text.find("policy_node: acts with a trained policy from a file."), 0u) << text;
   EXPECT_NE(text.find("which policy? Give the private parameter policy, e.g."), std::string::npos)
       << text;
   EXPECT_NE(text.find("cannot read the policy file /none (No such file or directory)."),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("the private parameter task is 'abc' but must be a whole number from 0 to"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("is the personal policy of task 0: leave the parameter out."),
             std::string::npos)
       << text;
 }

@@ -51,8 +51,7 @@ class Recording {
 
   // every agent of that run is done, the public ones with what they have to show
   static bool ended(const std::vector<RecordedMessage>& messages, const std::string& group) {
-    const pmeta::Experiment experiment =
-        readExperiment(ros::NodeHandle(group + "pmeta"), ros::NodeHandle("~"));
+    const pmeta::Experiment experiment = readExperiment(ros::NodeHandle(group + "pmeta"));
     std::set<std::uint32_t> done;
     for (const RecordedMessage& message : messages) {
       if (message.type != "pmeta_msgs/AgentStatus" || !isBelow(message.publisher, group)) continue;
@@ -79,7 +78,7 @@ class Privacy : public ::testing::Test {
  protected:
   Privacy()
       : recording_(Recording::get()),
-        experiment_(readExperiment(ros::NodeHandle(kPrivate + "pmeta"), ros::NodeHandle("~"))) {}
+        experiment_(readExperiment(ros::NodeHandle(kPrivate + "pmeta"))) {}
   void SetUp() override { ASSERT_TRUE(recording_.complete()) << "a run did not end in time"; }
 
   const Recording& recording_;

@@ -158,6 +158,29 @@ TEST_F(CheetahSceneTest, NamesWhatCannotBeDrawn) {
   message = slide(0, Trajectory::META, 3, 0.1);
   message.positions[4] = INFINITY;
   EXPECT_NE(std::string::npos, scene_->problem(message).find("not finite"));
+  message = slide(0, Trajectory::META, 3, 1e17);
+  EXPECT_EQ("it holds a position beyond 1e+10, which no simulation reaches.",
+            scene_->problem(message));
+  EXPECT_EQ("it has 100001 steps; at most 100000 are shown.",
+            scene_->problem(slide(0, Trajectory::META, 100001, 0)));
+}
+
+TEST(RobotScene, FarFromTheOriginThereAreAsManyMetresInView) {
+  for (const char* environment : {"half_cheetah_dir", "ant_fwd_back"}) {
+    const pmeta::Experiment two = robots(environment);
+    const auto scene = makeScene(two);
+    const std::size_t nq = environment == std::string("half_cheetah_dir") ? 9 : 15;
+    const std::vector<double> start(two.totalTasks(), 0.0);
+    const auto pointsAt = [&](double x) {
+      SceneContent content = contentOf(two.totalTasks());
+      std::vector<double> qpos(nq, 0.0);
+      qpos[0] = x;
+      content.tasks[0].personal.episode =
+          shared(episodeOfPositions(0, Trajectory::PERSONAL, {qpos, qpos}));
+      return find(scene->moving(content, start), "floors", 0).points.size();
+    };
+    EXPECT_EQ(pointsAt(0), pointsAt(1e10)) << environment;
+  }
 }
 
 TEST(RobotScene, CheetahsWithATargetVelocitySayIt) {

@@ -25,7 +25,7 @@ namespace pmeta_nodes {
 /// Follows a run that a .test file has launched in /pmeta, and compares it with the local runner.
 class RunOverRos : public ::testing::Test {
  protected:
-  RunOverRos() : nh_("/pmeta"), experiment_(readExperiment(nh_, ros::NodeHandle("~"))) {
+  RunOverRos() : nh_("/pmeta"), experiment_(readExperiment(nh_)) {
     meta_sub_ = nh_.subscribe("meta_policy", 8, &RunOverRos::onMeta, this);
     round_sub_ = nh_.subscribe("round", 64, &RunOverRos::onRound, this);
   }

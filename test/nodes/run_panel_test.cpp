@@ -204,6 +204,12 @@ struct FakeAggregator {
   ros::Publisher status;
 };
 
+TEST_F(RunPanelTest, TakesNothingThatItIsToldForMarkup) {
+  for (const QLabel* label : panel_->findChildren<QLabel*>()) {
+    EXPECT_EQ(label->textFormat(), Qt::PlainText) << label->objectName().toStdString();
+  }
+}
+
 TEST_F(RunPanelTest, SaysThatThereIsNoRun) {
   EXPECT_EQ(label("state"), "no run");
   EXPECT_EQ(label("message"), "no run on /pmeta: start one with ./pmeta run");

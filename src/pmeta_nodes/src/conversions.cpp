@@ -53,6 +53,7 @@ pmeta::MetaPolicy headerOf(const pmeta_msgs::MetaPolicy& msg) {
   meta.participants = toTasks(msg.participants);
   meta.evaluate = msg.evaluate != 0;
   meta.incarnation = msg.incarnation;
+  meta.settings_hash = msg.settings_hash;
   meta.checkpoint = msg.checkpoint != 0;
   return meta;
 }
@@ -63,6 +64,7 @@ pmeta::AuxiliaryUpdate headerOf(const pmeta_msgs::AuxiliaryUpdate& msg) {
   update.task = toInt(msg.task, "task");
   update.round = toInt(msg.round, "round");
   update.weight = msg.weight;
+  update.settings_hash = msg.settings_hash;
   return update;
 }
 
@@ -123,6 +125,7 @@ pmeta_msgs::MetaPolicy toMsg(const pmeta::MetaPolicy& meta, int rounds) {
   msg.participants = toUnsigned(meta.participants);
   msg.evaluate = static_cast<std::uint8_t>(meta.evaluate);
   msg.incarnation = meta.incarnation;
+  msg.settings_hash = meta.settings_hash;
   msg.checkpoint = static_cast<std::uint8_t>(meta.checkpoint);
   return msg;
 }
@@ -140,6 +143,7 @@ pmeta_msgs::AuxiliaryUpdate toMsg(pmeta::AuxiliaryUpdate update) {
   msg.round = static_cast<std::uint32_t>(update.round);
   msg.model = toMsg(std::move(update.model));
   msg.weight = update.weight;
+  msg.settings_hash = update.settings_hash;
   return msg;
 }
 
@@ -168,6 +172,7 @@ pmeta_msgs::TaskReturn toMsg(const pmeta::TaskReturn& result, const std::string&
   msg.episodes = static_cast<std::uint32_t>(result.episodes);
   msg.env_steps = static_cast<std::uint64_t>(result.env_steps);
   msg.updates = static_cast<std::uint64_t>(result.updates);
+  msg.broken_episodes = static_cast<std::uint64_t>(result.broken_episodes);
   msg.wall_s = result.seconds;
   return msg;
 }
@@ -195,6 +200,7 @@ pmeta::TaskReturn fromMsg(const pmeta_msgs::TaskReturn& msg) {
   result.episodes = toInt(msg.episodes, "number of episodes");
   result.env_steps = static_cast<std::int64_t>(msg.env_steps);
   result.updates = static_cast<std::int64_t>(msg.updates);
+  result.broken_episodes = static_cast<std::int64_t>(msg.broken_episodes);
   result.seconds = msg.wall_s;
   return result;
 }
@@ -298,6 +304,11 @@ std::string stateName(const pmeta_msgs::RoundSummary& msg) {
   const char* const names[] = {"unknown", "running", "late",   "finished",
                                "stopped", "paused",  "blocked"};
   return names[msg.state < std::size(names) ? msg.state : 0];
+}
+
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::AgentStatus& msg) {
+  return authenticator.mac(
+      {msg.run_id, toInt(msg.task, "task"), msg.state, msg.message, msg.incarnation});
 }
 
 pmeta::Mac macOf(const pmeta::Authenticator& authenticator,

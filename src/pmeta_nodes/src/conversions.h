@@ -53,6 +53,7 @@ std::string stateName(const pmeta_msgs::RoundSummary& msg);
 
 // The MAC that a message's contents ask for, read from the message as it is. They throw
 // pmeta::Error if a field is of no run.
+pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::AgentStatus& msg);
 pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::AuxiliaryUpdate& msg);
 pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::MetaPolicy& msg);
 pmeta::Mac macOf(const pmeta::Authenticator& authenticator, const pmeta_msgs::TaskReturn& msg);

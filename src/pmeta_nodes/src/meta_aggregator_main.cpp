@@ -1,6 +1,7 @@
 #include "meta_aggregator_node.h"
 #include "node_main.h"
 #include "pmeta_core/base/error.h"
+#include "private_param.h"
 
 namespace {
 
@@ -24,9 +25,8 @@ Normally started by roslaunch pmeta_nodes gridworld.launch.
 )";
 
 int runAggregator(const pmeta::Experiment& experiment) {
-  const ros::NodeHandle own("~");
-  const bool hold = own.param("hold", false);
-  const bool resume = own.param("resume", false);
+  const bool hold = pmeta_nodes::privateFlag("hold", false);
+  const bool resume = pmeta_nodes::privateFlag("resume", false);
   try {
     return pmeta_nodes::MetaAggregatorNode(experiment, hold, resume).spin();
   } catch (const pmeta::Error& error) {

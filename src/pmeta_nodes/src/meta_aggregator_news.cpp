@@ -69,6 +69,7 @@ void MetaAggregatorNode::reportHealth() {
   health_report_.summary = summary_.message;
   health_report_.values = {{"rounds complete", std::to_string(summary_.round)},
                            {"rounds in all", std::to_string(summary_.rounds)},
+                           {"broken episodes", std::to_string(book_.brokenEpisodes())},
                            {"refused", std::to_string(summary_.refused)}};
   for (int task = 0; task < experiment_.numTasks(); ++task) {
     const auto& counts = aggregator_.counts()[task];
@@ -81,6 +82,13 @@ void MetaAggregatorNode::reportHealth() {
             (counts.last_reason.empty() ? "" : "; last reason: " + counts.last_reason));
   }
   for (auto& value : refusals_.values()) health_report_.values.push_back(std::move(value));
+}
+
+// the worker, whose the summary is, has ended
+void MetaAggregatorNode::repeatLastWords() {
+  summary_.header.stamp = ros::Time::now();
+  sign(authenticator_, summary_);
+  round_pub_.publish(summary_);
 }
 
 void MetaAggregatorNode::announcePause() {

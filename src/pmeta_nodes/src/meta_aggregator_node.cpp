@@ -9,6 +9,7 @@
 #include "conversions.h"
 #include "node_main.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 #include "pmeta_core/run/policy_file.h"
 
 namespace pmeta_nodes {
@@ -25,6 +26,9 @@ constexpr std::chrono::duration<double> kStartUp{15};
 constexpr double kFarewell = 0.5;
 
 constexpr std::chrono::seconds kRetryDisk{2};
+// a node that has just started takes no news from before
+constexpr std::chrono::seconds kLastWords{2};
+constexpr std::size_t kMostReason = 500;  // bytes of a stranger's sentence
 
 bool isTerminal() { return isatty(STDOUT_FILENO) != 0; }
 
@@ -71,8 +75,9 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
       "agent_status", queue,
       boost::function<void(const pmeta_msgs::AgentStatus::ConstPtr&)>(
           [this](const pmeta_msgs::AgentStatus::ConstPtr& msg) {
-            if (msg->run_id == experiment_.settings().run_id)
-              roll_call_.heard(static_cast<int>(msg->task));
+            if (msg->run_id != experiment_.settings().run_id) return;
+            roll_call_.heard(static_cast<int>(msg->task));
+            if (msg->state == pmeta_msgs::AgentStatus::FAILED) mailbox_.push(msg);
           }),
       ros::VoidConstPtr(), hints);
   pause_service_ = nh_.advertiseService("pause", &MetaAggregatorNode::onPause, this);
@@ -101,12 +106,13 @@ std::unique_ptr<pmeta::RunLog> MetaAggregatorNode::openLog(bool resume) {
   if (status != "finished") lock.emplace(experiment_.runDir());
   std::vector<std::string> refused;
   const int rounds = experiment_.settings().rounds;
-  const int round = checkpoints_.newest(rounds, refused);
+  const auto fresh = [this] {
+    aggregator_ = pmeta::MetaAggregator(experiment_);
+    book_ = pmeta::RoundBook(experiment_);
+    return State{aggregator_, book_};
+  };
+  const int round = checkpoints_.loadNewest(rounds, fresh, refused);
   for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
-  if (round > 0) {
-    State state{aggregator_, book_};
-    checkpoints_.load(round, state);
-  }
   if (!lock) return nullptr;
   ROS_INFO("going on after round %d.", round);
   return std::make_unique<pmeta::RunLog>(
@@ -120,8 +126,12 @@ MetaAggregatorNode::~MetaAggregatorNode() {
 }
 
 int MetaAggregatorNode::spin() {
+  Clock::time_point next_words = Clock::now();
   while (!stopRequested() && !(done_ && !hold_)) {
     ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
+    if (!done_ || Clock::now() < next_words) continue;
+    next_words = Clock::now() + kLastWords;
+    repeatLastWords();
   }
   stop_ = true;
   mailbox_.close();
@@ -195,6 +205,8 @@ void MetaAggregatorNode::runRounds() {
   publishMetaPolicy();
   while (!stop_ && (book_.roundsTaken() < rounds || !unwritten_.empty())) {
     if (const auto message = mailbox_.pop(kTick)) take(*message);
+    const std::string hopeless = aggregator_.hopeless();
+    if (!hopeless.empty()) throw pmeta::Error(hopeless);
     collectCompleteRounds(false);
     writeDown();
     announcePause();
@@ -225,8 +237,10 @@ void MetaAggregatorNode::take(const Message& message) {
   try {
     if (const auto* update = std::get_if<pmeta_msgs::AuxiliaryUpdate::Ptr>(&message)) {
       takeUpdate(**update);
+    } else if (const auto* result = std::get_if<pmeta_msgs::TaskReturn::ConstPtr>(&message)) {
+      takeReturn(**result);
     } else {
-      takeReturn(*std::get<pmeta_msgs::TaskReturn::ConstPtr>(message));
+      takeFailure(*std::get<pmeta_msgs::AgentStatus::ConstPtr>(message));
     }
   } catch (const pmeta::Error& error) {
     refuse(error.what());
@@ -239,8 +253,8 @@ void MetaAggregatorNode::takeUpdate(pmeta_msgs::AuxiliaryUpdate& msg) {
   if (!forgery.empty()) return refuse(forgery);
   // a foreign run's blob is not even unpacked
   if (msg.run_id != summary_.run_id) {
-    return refuseUpdate(
-        task, "an update belongs to run '" + msg.run_id + "', not to '" + summary_.run_id + "'.");
+    return refuseUpdate(task, "an update belongs to run " + pmeta::shown(msg.run_id) + ", not to " +
+                                  pmeta::shown(summary_.run_id) + ".");
   }
   try {
     const auto answer =
@@ -255,6 +269,18 @@ void MetaAggregatorNode::takeReturn(const pmeta_msgs::TaskReturn& msg) {
   const std::string forgery = refusals_.judge("a return", authenticate(authenticator_, msg));
   if (!forgery.empty()) return refuse(forgery);
   refusals_.count(book_.add(fromMsg(msg)) ? "returns booked" : "returns not due");
+}
+
+void MetaAggregatorNode::takeFailure(const pmeta_msgs::AgentStatus& msg) {
+  const std::string forgery =
+      refusals_.judge("an agent's failure", authenticate(authenticator_, msg));
+  if (!forgery.empty()) return refuse(forgery);
+  // one of before this aggregator was started may have been mended since
+  if (msg.incarnation != incarnation_) return refusals_.count("failures of before");
+  const auto task = static_cast<int>(msg.task);
+  if (task < 0 || task >= experiment_.totalTasks()) return refusals_.count("failures of no task");
+  const std::string reason = pmeta::plain(msg.message, kMostReason);
+  if (aggregator_.giveUp(task, reason)) ROS_ERROR("%s", reason.c_str());
 }
 
 void MetaAggregatorNode::refuseUpdate(int task, const std::string& reason) {

@@ -38,7 +38,8 @@ namespace pmeta_nodes {
 /// Subscribes to auxiliary and returns; publishes meta_policy, round and scores (all latched), and
 /// writes the run folder. A round is closed once every task's update and return are in, or, after
 /// round_timeout, once a quorum of updates is. Who has not been heard of for 1.5 s, or is late, is
-/// named on `round`: since when, and what happens next.
+/// named on `round`: since when, and what happens next. An agent that has failed for good ends the
+/// run, unless a quorum of fewer than all is left.
 ///
 /// After each checkpoint.interval-th round the state is saved before the meta-policy goes out, so
 /// that whoever has seen a round can count on it. While the disk takes nothing, the round in hand
@@ -61,7 +62,8 @@ class MetaAggregatorNode {
 
  private:
   using Clock = std::chrono::steady_clock;
-  using Message = std::variant<pmeta_msgs::AuxiliaryUpdate::Ptr, pmeta_msgs::TaskReturn::ConstPtr>;
+  using Message = std::variant<pmeta_msgs::AuxiliaryUpdate::Ptr, pmeta_msgs::TaskReturn::ConstPtr,
+                               pmeta_msgs::AgentStatus::ConstPtr>;
 
   /// What a checkpoint holds.
   struct State {
@@ -84,6 +86,7 @@ class MetaAggregatorNode {
   void take(const Message& message);
   void takeUpdate(pmeta_msgs::AuxiliaryUpdate& msg);
   void takeReturn(const pmeta_msgs::TaskReturn& msg);
+  void takeFailure(const pmeta_msgs::AgentStatus& msg);
   void refuse(const std::string& reason);
   void refuseUpdate(int task, const std::string& reason);
   void closeRoundIfDue();
@@ -91,6 +94,7 @@ class MetaAggregatorNode {
   void writeDown();
   void saveCheckpoint();
   void publishMetaPolicy();
+  void repeatLastWords();
   void announcePause();
   void publishRound(std::uint8_t state, const std::string& message);
   void announceMissing();

@@ -11,6 +11,7 @@
 #include "free_memory.h"
 #include "master_watch.h"
 #include "pmeta_core/base/error.h"
+#include "private_param.h"
 
 namespace pmeta_nodes {
 namespace {
@@ -50,7 +51,7 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   try {
-    const pmeta::Experiment experiment = readExperiment(nh, ros::NodeHandle("~"));
+    const pmeta::Experiment experiment = readExperiment(nh);
     g_master = std::make_unique<MasterWatch>();
     int code = body(experiment);
     const std::string trouble = g_master->trouble();
@@ -71,11 +72,9 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
 
 bool stopRequested() { return g_stop || !ros::ok() || (g_master && !g_master->trouble().empty()); }
 
-pmeta::Experiment readExperiment(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh) {
-  std::string file;
-  if (private_nh.getParam("config_file", file) && !file.empty()) {
-    return pmeta::Experiment::load(file);
-  }
+pmeta::Experiment readExperiment(const ros::NodeHandle& nh) {
+  const std::string file = privateText("config_file", "");
+  if (!file.empty()) return pmeta::Experiment::load(file);
   std::string text;
   if (!nh.getParam("config", text)) {
     throw pmeta::Error("the parameter " + nh.resolveName("config") +

@@ -24,6 +24,6 @@ bool stopRequested();
 
 /// The experiment from `~config_file`, if given, or else from the parameter `config`, which the
 /// launch file sets to the effective settings. Throws pmeta::Error if there is none.
-pmeta::Experiment readExperiment(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh);
+pmeta::Experiment readExperiment(const ros::NodeHandle& nh);
 
 }  // namespace pmeta_nodes

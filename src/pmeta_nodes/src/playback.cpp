@@ -21,8 +21,9 @@ bool Playback::offer(const Trajectory::ConstPtr& episode) {
 
 bool Playback::advance(double seconds) {
   seconds_ += seconds;
-  if (seconds_ < period()) return false;
-  seconds_ = 0;
+  waited_ = personal_.next || meta_.next ? waited_ + seconds : 0;
+  if (seconds_ < period() && waited_ < kLongestWait) return false;
+  seconds_ = waited_ = 0;
   bool changed = false;
   for (Track* track : {&personal_, &meta_}) {
     if (!track->next) continue;

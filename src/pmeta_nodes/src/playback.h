@@ -7,11 +7,13 @@
 namespace pmeta_nodes {
 
 /// Plays the last episodes of one task in a loop, both policies from the same start. A new episode
-/// waits until those that are playing have been seen to their end.
+/// waits until those that are playing have been seen to their end, but no longer than a minute.
 class Playback {
  public:
   /// Both last episodes stand still for so long, in s, before they begin anew.
   static constexpr double kPause = 1;
+  /// So long, in s, a new episode waits for the end of longer ones at most.
+  static constexpr double kLongestWait = 60;
 
   /// `step_seconds` as Scene::stepSeconds(); with 0 a new episode is shown at once.
   explicit Playback(double step_seconds) : step_seconds_(step_seconds) {}
@@ -38,6 +40,7 @@ class Playback {
 
   double step_seconds_;
   double seconds_ = 0;
+  double waited_ = 0;  // of the episode that has waited longest for its turn
   Track personal_;
   Track meta_;
 };

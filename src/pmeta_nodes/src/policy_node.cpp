@@ -4,9 +4,16 @@
 #include <chrono>
 #include <cstdio>
 
+#include "pmeta_core/base/error.h"
+
 namespace pmeta_nodes {
 
 PolicyNode::PolicyNode(const std::string& path, int task) : policy_(path, task) {
+  if (policy_.task() >= 0 && task >= 0 && task != policy_.task()) {
+    throw pmeta::Error("the private parameter task is " + std::to_string(task) + " but " + path +
+                       " is the personal policy of task " + std::to_string(policy_.task()) +
+                       ": leave the parameter out.");
+  }
   const std::string description = policy_.description();
   action_.data.resize(static_cast<std::size_t>(policy_.spec().action_size));
   action_pub_ = nh_.advertise<std_msgs::Float64MultiArray>("action", 1);

@@ -20,7 +20,8 @@ namespace pmeta_nodes {
 /// Only the newest observation counts.
 class PolicyNode {
  public:
-  /// Throws pmeta::Error if `path` is not a policy file.
+  /// `task`: for a meta-policy, on which to act; -1: not said. Throws pmeta::Error if `path` is not
+  /// a policy file, or of another task's personal policy.
   PolicyNode(const std::string& path, int task);
 
  private:

@@ -5,6 +5,7 @@
 #include "node_main.h"
 #include "pmeta_core/base/error.h"
 #include "policy_node.h"
+#include "private_param.h"
 
 namespace {
 
@@ -22,16 +23,18 @@ publishes    action (std_msgs/Float64MultiArray): the greedy action, one number 
 An observation of a wrong size, or that is not finite, gets a warning and no action.
 )";
 
+constexpr int kMostTasks = 1000000;  // whose policy it is decides how many there are
+
 void onSignal(int) { ros::requestShutdown(); }
 
 void act() {
-  std::string path;
-  if (!ros::NodeHandle("~").getParam("policy", path) || path.empty()) {
+  const std::string path = pmeta_nodes::privateText("policy", "");
+  if (path.empty()) {
     throw pmeta::Error(
         "which policy? Give the private parameter policy, e.g. "
         "_policy:=RUN_FOLDER/policies/task_0.safetensors.");
   }
-  const pmeta_nodes::PolicyNode node(path, ros::NodeHandle("~").param("task", -1));
+  const pmeta_nodes::PolicyNode node(path, pmeta_nodes::privateIndex("task", -1, kMostTasks));
   ros::spin();
 }
 

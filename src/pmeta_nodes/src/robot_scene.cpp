@@ -1,6 +1,8 @@
 #include "robot_scene.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/env/ant.h"
@@ -20,6 +22,7 @@ constexpr double kFloorDepth = 0.3;  // m of the lane below the floor of planar 
 constexpr double kAir = 0.35;        // m above the highest point at rest
 constexpr double kLegRoom = 0.55;    // m above the floor that is seen from above
 constexpr std::size_t kMostPathPoints = 200;
+constexpr double kFarthest = 1e10;  // m or rad: as far as MujocoSimulation lets a state go
 
 constexpr double kFloorLayer = 0.1;
 constexpr double kTargetLayer = 0.2;
@@ -30,6 +33,17 @@ const Color kFloor = rgb(0xdde1e7);
 const Color kTick = rgb(0xa9b0bc);
 const Color kFloorLine = rgb(0x555b66);
 const Color kTarget = rgb(0xe08a00);
+
+// the whole metres within `half` of `center`, which is no further away than kFarthest
+std::vector<double> wholeMetres(double center, double half) {
+  std::vector<double> metres;
+  const auto first = static_cast<std::int64_t>(std::ceil(center - half));
+  const auto last = static_cast<std::int64_t>(std::floor(center + half));
+  for (std::int64_t metre = first; metre <= last; ++metre) {
+    metres.push_back(static_cast<double>(metre));
+  }
+  return metres;
+}
 
 std::string robotFrame(int task, int policy) { return policyFrame(task, policy) + "/robot"; }
 
@@ -82,7 +96,14 @@ std::string RobotScene::problem(const Trajectory& trajectory) const {
            std::to_string(numSteps(trajectory)) + " steps; the model's are of size " +
            std::to_string(kinematics_->nq()) + ".";
   }
-  return formProblem(trajectory, trajectory.observation_size);
+  const std::string problem = formProblem(trajectory, trajectory.observation_size);
+  if (!problem.empty()) return problem;
+  for (const double value : trajectory.positions) {
+    if (std::abs(value) > kFarthest) {
+      return "it holds a position beyond " + number(kFarthest) + ", which no simulation reaches.";
+    }
+  }
+  return "";
 }
 
 double RobotScene::halfWidth() const { return cards_.lane_width / 2 / scale(); }
@@ -200,7 +221,7 @@ void RobotScene::drawFloor(const Moment& moment, MarkerArray& scene) const {
     Figure floor(moment.lane_frame, "floors", id, kFloorLayer);
     floor.rectangle(-half * s, -0.14 * s, half * s, 0, kFloor);
     floor.raise();
-    for (double x = std::ceil(origin.x - half); x <= origin.x + half; ++x) {
+    for (const double x : wholeMetres(origin.x, half)) {
       const double at = (x - origin.x) * s;
       floor.rectangle(at - line, -0.14 * s, at + line, 0, kTick);
     }
@@ -213,11 +234,11 @@ void RobotScene::drawFloor(const Moment& moment, MarkerArray& scene) const {
   const double depth = camera_.view_depth / 2;
   floor.rectangle(-half * s, -depth * s, half * s, depth * s, kFloor);
   floor.raise();
-  for (double x = std::ceil(origin.x - half); x <= origin.x + half; ++x) {
+  for (const double x : wholeMetres(origin.x, half)) {
     const double at = (x - origin.x) * s;
     floor.rectangle(at - line / 2, -depth * s, at + line / 2, depth * s, kTick);
   }
-  for (double y = std::ceil(origin.y - depth); y <= origin.y + depth; ++y) {
+  for (const double y : wholeMetres(origin.y, depth)) {
     const double at = (y - origin.y) * s;
     floor.rectangle(-half * s, at - line / 2, half * s, at + line / 2, kTick);
   }

@@ -10,7 +10,9 @@
 
 #include "conversions.h"
 #include "launch_parent.h"
+#include "news_order.h"
 #include "node_main.h"
+#include "private_param.h"
 
 namespace {
 
@@ -45,11 +47,13 @@ void endLaunch() {
 }
 
 int guard(const pmeta::Experiment& experiment) {
-  const bool hold = ros::NodeHandle("~").param("hold", false);
-  const std::string read = ros::NodeHandle("~").param("read_launch", std::string());
+  const bool hold = pmeta_nodes::privateFlag("hold", false);
+  const std::string read = pmeta_nodes::privateText("read_launch", "");
   if (!read.empty()) std::remove(read.c_str());
   const std::string run_id = experiment.settings().run_id;
   const pmeta::Authenticator authenticator(experiment.settings().key_file);
+  // signed news of before may have been recorded and be sent again, with its end of the run
+  pmeta_nodes::NewsOrder order(ros::Time::now());
   int code = -1;
   ros::NodeHandle nh;
   const ros::Subscriber rounds = nh.subscribe<RoundSummary>(
@@ -60,6 +64,7 @@ int guard(const pmeta::Experiment& experiment) {
           ROS_WARN_THROTTLE(10, "ignoring news of the run that is not authentic.");
           return;
         }
+        if (authenticator.hasKey() && !order.take(msg->header.stamp)) return;
         if (msg->state == RoundSummary::FINISHED) code = 0;
         if (msg->state == RoundSummary::STOPPED) code = 1;
       }));

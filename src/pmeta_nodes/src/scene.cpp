@@ -13,6 +13,12 @@ namespace pmeta_nodes {
 
 using pmeta_msgs::Trajectory;
 
+namespace {
+
+constexpr std::size_t kMostSteps = 100000;
+
+}  // namespace
+
 std::unique_ptr<Scene> makeScene(const pmeta::Experiment& experiment) {
   const pmeta::EnvFamily& family = experiment.family();
   if (const auto* grids = dynamic_cast<const pmeta::GridworldFamily*>(&family)) {
@@ -51,6 +57,10 @@ std::string formProblem(const Trajectory& trajectory, std::size_t observation_si
     return "policy " + std::to_string(trajectory.policy) + " is neither personal nor meta.";
   }
   const std::size_t steps = numSteps(trajectory);
+  if (steps > kMostSteps) {
+    return "it has " + std::to_string(steps) + " steps; at most " + std::to_string(kMostSteps) +
+           " are shown.";
+  }
   if (trajectory.observation_size != observation_size ||
       trajectory.observations.size() != (steps + 1) * observation_size) {
     return "it has " + std::to_string(trajectory.observations.size()) + " observations of size " +

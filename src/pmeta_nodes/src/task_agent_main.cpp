@@ -1,5 +1,6 @@
 #include "node_main.h"
 #include "pmeta_core/base/error.h"
+#include "private_param.h"
 #include "task_agent_node.h"
 
 namespace {
@@ -20,15 +21,9 @@ Normally started by roslaunch pmeta_nodes gridworld.launch, one process for each
 )";
 
 int runAgent(const pmeta::Experiment& experiment) {
-  int task = -1;
-  if (!ros::NodeHandle("~").getParam("task", task)) {
-    throw pmeta::Error("which task? Give the private parameter task, e.g. _task:=0.");
-  }
-  if (task < 0 || task >= experiment.totalTasks()) {
-    throw pmeta::Error("task is " + std::to_string(task) + " but must be from 0 to " +
-                       std::to_string(experiment.totalTasks() - 1) + ".");
-  }
-  const bool resume = ros::NodeHandle("~").param("resume", false);
+  const int task = pmeta_nodes::privateIndex("task", -1, experiment.totalTasks() - 1);
+  if (task < 0) throw pmeta::Error("which task? Give the private parameter task, e.g. _task:=0.");
+  const bool resume = pmeta_nodes::privateFlag("resume", false);
   return pmeta_nodes::TaskAgentNode(experiment, task, resume).spin();
 }
 

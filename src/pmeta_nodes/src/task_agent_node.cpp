@@ -8,6 +8,8 @@
 #include "conversions.h"
 #include "node_main.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
+#include "pmeta_core/run/divergence.h"
 #include "pmeta_core/run/policy_file.h"
 
 namespace pmeta_nodes {
@@ -85,7 +87,7 @@ int TaskAgentNode::spin() {
   stop_ = true;
   mailbox_.close();
   trainer_.join();
-  return failed_ ? 1 : 0;
+  return failed_ || gave_up_ ? 1 : 0;
 }
 
 bool TaskAgentNode::isAuthentic(const std::string& kind, pmeta::Authenticity authenticity) {
@@ -105,9 +107,15 @@ bool TaskAgentNode::isAuthentic(const std::string& kind, pmeta::Authenticity aut
 void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::Ptr& msg) {
   if (!isAuthentic("a meta-policy", authenticate(authenticator_, *msg))) return;
   if (msg->run_id != status_.run_id) {
-    ROS_WARN_THROTTLE(10, "ignoring a meta-policy of run '%s'; this agent belongs to '%s'.",
-                      msg->run_id.c_str(), status_.run_id.c_str());
+    ROS_WARN_THROTTLE(10, "ignoring a meta-policy of run %s; this agent belongs to %s.",
+                      pmeta::shown(msg->run_id).c_str(), pmeta::shown(status_.run_id).c_str());
     return;
+  }
+  if (msg->settings_hash != experiment_.settingsHash()) {
+    const std::string mismatch =
+        pmeta::otherSettings("the aggregator", msg->settings_hash, experiment_.settingsHash());
+    ROS_ERROR_THROTTLE(10, "ignored: %s", mismatch.c_str());
+    return setState(AgentStatus::WAITING, mismatch);
   }
   {
     // a newer meta-policy shows that the aggregator has all we owed it for the rounds before
@@ -134,10 +142,9 @@ void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::Ptr& msg) {
 void TaskAgentNode::onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
   if (!isAuthentic("a round message", authenticate(authenticator_, *msg))) return;
   if (msg->run_id != status_.run_id) return;
-  if (authenticator_.hasKey() && msg->header.stamp < newest_news_) {
+  if (authenticator_.hasKey() && !news_.take(msg->header.stamp)) {
     return refusals_.count("replayed: a round message");
   }
-  newest_news_ = msg->header.stamp;
   if (msg->state != pmeta_msgs::RoundSummary::FINISHED &&
       msg->state != pmeta_msgs::RoundSummary::STOPPED) {
     return;
@@ -150,11 +157,15 @@ void TaskAgentNode::onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
 
 void TaskAgentNode::train() {
   try {
-    while (!stop_) {
+    while (!stop_ && !gave_up_) {
       const auto msg = mailbox_.pop(std::chrono::seconds(1));
       if (!msg) continue;
       try {
         trainFrom(fromMsg(std::move(**msg)));
+      } catch (const pmeta::TaskFailed& failure) {
+        ROS_ERROR("%s", failure.what());
+        gave_up_ = true;
+        setState(AgentStatus::FAILED, failure.what());
       } catch (const pmeta::Error& error) {
         // a meta-policy that does not fit is not trained on; a good one may still come
         ROS_ERROR("%s", error.what());
@@ -163,7 +174,8 @@ void TaskAgentNode::train() {
     }
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());
-    setState(AgentStatus::FAILED, error.what());
+    // nothing that is known to come again: roslaunch starts this process anew
+    setState(AgentStatus::WAITING, error.what());
     failed_ = true;
   }
 }
@@ -211,6 +223,7 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     status_.env_steps_per_s = static_cast<double>(result->env_steps) / seconds;
     status_.updates_per_s = static_cast<double>(result->updates) / seconds;
     status_.loss = result->loss;
+    status_.broken_episodes = static_cast<std::uint64_t>(agent_.brokenEpisodes());
     status_.distance_to_meta = result->distance;
     status_.train_s = seconds;
   }
@@ -233,15 +246,11 @@ void TaskAgentNode::returnTo(const pmeta::MetaPolicy& meta) {
   const bool started = have == 0 && resume_;
   if (!ahead && !started) return;
   std::vector<std::string> refused;
-  int round = checkpoints_.newest(meta.round + 1, refused);
-  if (ahead) agent_ = pmeta::TaskAgent(experiment_, agent_.task());
-  try {
-    if (round > 0) checkpoints_.load(round, agent_);
-  } catch (const pmeta::Error& error) {
-    refused.push_back(error.what());
+  const auto fresh = [this]() -> pmeta::TaskAgent& {
     agent_ = pmeta::TaskAgent(experiment_, agent_.task());
-    round = 0;
-  }
+    return agent_;
+  };
+  const int round = checkpoints_.loadNewest(meta.round + 1, fresh, refused);
   for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
   saved_round_ = round;
   if (round > 0) ROS_INFO("%s goes on after round %d.", status_.task_name.c_str(), round);
@@ -339,6 +348,8 @@ void TaskAgentNode::publishStatus() {
   const std::lock_guard<std::mutex> lock(mutex_);
   status_.header.stamp = ros::Time::now();
   status_.state_name = stateName(status_);
+  status_.incarnation = incarnation_;
+  sign(authenticator_, status_);
   status_pub_.publish(status_);
 }
 
@@ -355,6 +366,7 @@ HealthReport TaskAgentNode::health() {
                    {"env steps/s", pmeta::formatNumber(status_.env_steps_per_s)},
                    {"loss", pmeta::formatNumber(status_.loss)},
                    {"distance to meta", pmeta::formatNumber(status_.distance_to_meta)},
+                   {"broken episodes", std::to_string(status_.broken_episodes)},
                    {"unconfirmed messages",
                     std::to_string(unconfirmed_returns_.size() + unconfirmed_updates_.size())}};
   for (auto& value : refusals_.values()) {

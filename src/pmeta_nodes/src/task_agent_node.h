@@ -20,6 +20,7 @@
 
 #include "health.h"
 #include "mailbox.h"
+#include "news_order.h"
 #include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/checkpoint.h"
 #include "pmeta_core/run/experiment.h"
@@ -36,8 +37,10 @@ namespace pmeta_nodes {
 /// the end of the run, shows that it has it. With a key_file, what it sends is signed and what is
 /// not authentic it ignores. A checkpoint is on the disk before that round's update is sent, so an
 /// agent that is killed comes back with all that anybody has seen of it; where the aggregator had
-/// to go back some rounds, the agent follows. The last round's personal policy stays on this
-/// machine, as policies/task_<i>.safetensors of the run folder.
+/// to go back some rounds, the agent follows. Training that cannot go on (TaskFailed) is told by
+/// the state FAILED until the run has ended: the same would come of it if it were started again.
+/// The last round's personal policy stays on this machine, as policies/task_<i>.safetensors of the
+/// run folder.
 class TaskAgentNode {
  public:
   /// resume: begin with the newest checkpoint in the run folder, if there is one.
@@ -88,10 +91,11 @@ class TaskAgentNode {
   Mailbox<pmeta_msgs::MetaPolicy::Ptr> mailbox_{1};
   std::atomic<bool> stop_{false};
   std::atomic<bool> failed_{false};
+  std::atomic<bool> gave_up_{false};  ///< the state is FAILED, and stays so
   std::atomic<bool> run_ended_{false};
 
-  Refusals refusals_;      ///< the spinning thread's, as is newest_news_
-  ros::Time newest_news_;  ///< stamp of the newest message about the run's state
+  Refusals refusals_;  ///< the spinning thread's, as is news_
+  NewsOrder news_;     ///< of messages about the run's state
 
   std::mutex mutex_;  ///< guards what follows
   pmeta_msgs::AgentStatus status_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "private_param.h"
+
 namespace pmeta_nodes {
 namespace {
 
@@ -14,20 +16,9 @@ constexpr double kWarnPeriod = 10;  // seconds
 constexpr int kPolicies = 2;
 constexpr double kLongestPlayStep = 0.5;  // s: a machine that hangs does not skip episodes
 
-/// A private parameter in (0, highest].
-double positiveParam(const ros::NodeHandle& private_nh, const std::string& name,
-                     double default_value, double highest) {
-  const double value = private_nh.param(name, default_value);
-  if (value > 0 && value <= highest) return value;
-  ROS_WARN("%s is %g; it must lie in (0, %g]. Using %g.", name.c_str(), value, highest,
-           default_value);
-  return default_value;
-}
-
 }  // namespace
 
-TrajectoryView::TrajectoryView(ros::NodeHandle nh, ros::NodeHandle private_nh,
-                               const pmeta::Experiment& experiment)
+TrajectoryView::TrajectoryView(ros::NodeHandle nh, const pmeta::Experiment& experiment)
     : scene_(makeScene(experiment)) {
   const pmeta::ExperimentSettings& settings = experiment.settings();
   if (scene_ == nullptr) {
@@ -50,17 +41,17 @@ TrajectoryView::TrajectoryView(ros::NodeHandle nh, ros::NodeHandle private_nh,
   markers_ = nh.advertise<visualization_msgs::MarkerArray>("markers", 1, true);
   subscribe(nh, settings, num_tasks);
   constexpr double kHighestRate = 60;
-  redraw_timer_ = nh.createWallTimer(
-      ros::WallDuration(1 / positiveParam(private_nh, "redraw_rate", 10, kHighestRate)),
-      &TrajectoryView::redraw, this);
+  redraw_timer_ =
+      nh.createWallTimer(ros::WallDuration(1 / privatePositive("redraw_rate", 10, kHighestRate)),
+                         &TrajectoryView::redraw, this);
   if (scene_->stepSeconds() == 0) return;
 
   moving_markers_ = nh.advertise<visualization_msgs::MarkerArray>("playback", 1, true);
-  speed_ = positiveParam(private_nh, "speed", 1, 100);
+  speed_ = privatePositive("speed", 1, 100);
   last_play_ = ros::WallTime::now();
-  play_timer_ = nh.createWallTimer(
-      ros::WallDuration(1 / positiveParam(private_nh, "frame_rate", 20, kHighestRate)),
-      &TrajectoryView::play, this);
+  play_timer_ =
+      nh.createWallTimer(ros::WallDuration(1 / privatePositive("frame_rate", 20, kHighestRate)),
+                         &TrajectoryView::play, this);
 }
 
 void TrajectoryView::subscribe(ros::NodeHandle& nh, const pmeta::ExperimentSettings& settings,

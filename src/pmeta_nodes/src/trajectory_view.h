@@ -25,8 +25,7 @@ namespace pmeta_nodes {
 class TrajectoryView {
  public:
   /// `experiment` must outlive the view.
-  TrajectoryView(ros::NodeHandle nh, ros::NodeHandle private_nh,
-                 const pmeta::Experiment& experiment);
+  TrajectoryView(ros::NodeHandle nh, const pmeta::Experiment& experiment);
 
  private:
   void subscribe(ros::NodeHandle& nh, const pmeta::ExperimentSettings& settings, int num_tasks);

@@ -22,7 +22,7 @@ Started by roslaunch pmeta_nodes gridworld.launch rviz:=true, and so for every e
 
 int runView(const pmeta::Experiment& experiment) {
   ros::NodeHandle nh;
-  pmeta_nodes::TrajectoryView view(nh, ros::NodeHandle("~"), experiment);
+  pmeta_nodes::TrajectoryView view(nh, experiment);
   while (!pmeta_nodes::stopRequested()) {
     ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
   }

@@ -150,5 +150,48 @@ TEST(Evaluation, RecordsTheFirstEpisode) {
   }
 }
 
+// gives reward 1 a step and breaks down at its own, 0 being the start
+class Fragile : public Env {
+ public:
+  explicit Fragile(int breaks_at) : breaks_at_(breaks_at) {}
+  const EnvSpec& spec() const override { return spec_; }
+  void reset(Rng&, double* observation) override {
+    steps_ = 0;
+    if (breaks_at_ == 0) throw BrokenEpisode("fragile, step 0: it broke");
+    observation[0] = 0;
+  }
+  Step step(const double*, Rng&, double* observation) override {
+    observation[0] = ++steps_;
+    if (steps_ == breaks_at_) throw BrokenEpisode("fragile: it broke");
+    return {1, false, steps_ == spec_.horizon};
+  }
+
+ private:
+  EnvSpec spec_{"fragile", 1, 1, 0, 5};
+  int breaks_at_;
+  int steps_ = 0;
+};
+
+TEST(Evaluation, AnEpisodeThatBreaksDownCountsWithItsReturnUntilThen) {
+  std::vector<std::unique_ptr<Env>> envs;
+  for (const int breaks_at : {3, 9, 0, 1}) envs.push_back(std::make_unique<Fragile>(breaks_at));
+  Evaluation evaluation(std::move(envs));
+  Rng rng(1, 0, Stream::kEvaluate);
+  const auto still = [](const float*, int batch, double* actions) {
+    std::fill_n(actions, batch, 0);
+  };
+  for (int again = 0; again < 2; ++again) {
+    const ReturnStats stats = evaluation.run(still, rng);
+    EXPECT_EQ(stats.episodes, 4);
+    EXPECT_EQ(stats.broken_episodes, 3);
+    EXPECT_EQ(stats.mean, (2 + 5 + 0 + 0) / 4.0);
+  }
+  const Episode episode = evaluation.record(still, rng);
+  EXPECT_EQ(episode.rewards, (std::vector<double>{1, 1}));
+  EXPECT_EQ(episode.observations, (std::vector<double>{0, 1, 2})) << "without what broke it";
+  EXPECT_TRUE(episode.truncated);
+  EXPECT_FALSE(episode.terminated);
+}
+
 }  // namespace
 }  // namespace pmeta

@@ -23,7 +23,7 @@ const Authenticator& authenticator() {
 }
 
 AuxiliaryUpdate update() {
-  AuxiliaryUpdate update = {"run", 2, 5, Model(), 1.5};
+  AuxiliaryUpdate update = {"run", 2, 5, Model(), 1.5, "a"};
   update.model = Model(ModelLayout(Precision::kFloat64, {{"q_table", {2, 2}}}));
   update.model.doubles() = {1, -2, 3e-310, 4};
   update.model.present = {1, 1, 0, 1};
@@ -31,7 +31,7 @@ AuxiliaryUpdate update() {
 }
 
 MetaPolicy metaPolicy() {
-  MetaPolicy meta = {"run", 5, Model(), {0, 2}};
+  MetaPolicy meta = {"run", 5, Model(), {0, 2}, false, 0, false, "a"};
   meta.model = Model(ModelLayout(Precision::kFloat32, {{"w", {3}}, {"b", {1}}}));
   meta.model.floats() = {1, -2, 3, 4};
   return meta;
@@ -88,7 +88,7 @@ TEST(Authentication, EachFieldOfAnUpdateCounts) {
        [](M& m) { m.weight = 2; }, [](M& m) { std::swap(m.task, m.round); },
        [](M& m) { m.model.doubles()[3] = 5; }, [](M& m) { m.model.doubles()[2] = 0; },
        [](M& m) { m.model.doubles().pop_back(); }, [](M& m) { m.model.present[2] = 1; },
-       [](M& m) { m.model.present.clear(); },
+       [](M& m) { m.model.present.clear(); }, [](M& m) { m.settings_hash = "b"; },
        [](M& m) {
          m.model.layout = {Precision::kFloat64, {{"q_table", {4}}}};
        },
@@ -103,6 +103,7 @@ TEST(Authentication, EachFieldOfAMetaPolicyCounts) {
                      {[](M& m) { m.run_id = "run2"; }, [](M& m) { m.round = 6; },
                       [](M& m) { m.participants = {0}; }, [](M& m) { m.evaluate = true; },
                       [](M& m) { m.incarnation = 1; }, [](M& m) { m.checkpoint = true; },
+                      [](M& m) { m.settings_hash = "b"; },
                       [](M& m) {
                         m.participants = {2, 0};
                       },
@@ -125,8 +126,16 @@ TEST(Authentication, EachFieldOfAReturnCounts) {
        [](M& m) { m.scheduled = false; }, [](M& m) { m.context_episodes = 1; },
        [](M& m) { m.mean = 1.5; }, [](M& m) { m.std = 0; }, [](M& m) { m.episodes = 16; },
        [](M& m) { m.env_steps = 1; }, [](M& m) { m.updates = 31; },
-       [](M& m) { m.seconds = 0.25; }});
+       [](M& m) { m.broken_episodes = 1; }, [](M& m) { m.seconds = 0.25; }});
   EXPECT_NE(authenticator().mac(taskReturn(), "a"), authenticator().mac(taskReturn(), "b"));
+}
+
+TEST(Authentication, WhatOthersActOnInTheStateOfAnAgentCounts) {
+  using M = AgentNews;
+  expectAllDiffer<M>(
+      {"run", 2, 5, "failed", 7}, [](const M& m) { return authenticator().mac(m); },
+      {[](M& m) { m.run_id = "other"; }, [](M& m) { m.task = 1; }, [](M& m) { m.state = 1; },
+       [](M& m) { m.message = ""; }, [](M& m) { m.incarnation = 8; }});
 }
 
 TEST(Authentication, EachFieldOfARoundMessageCounts) {

@@ -26,6 +26,7 @@ std::shared_ptr<AuxiliaryUpdate> makeUpdate(const Experiment& experiment, int ta
                                             double weight = 1) {
   auto update = std::make_shared<AuxiliaryUpdate>();
   update->run_id = "run";
+  update->settings_hash = experiment.settingsHash();
   update->task = task;
   update->round = round;
   update->weight = weight;
@@ -349,6 +350,50 @@ TEST(MetaAggregator, CountsRefusalsMadeBeforeTheOffer) {
   EXPECT_EQ(aggregator.counts()[1].last_reason, "a model's checksum does not fit.");
   EXPECT_EQ(aggregator.counts()[0].last_reason, "");
   EXPECT_EQ(aggregator.refusedUnknown(), 2);
+}
+
+TEST(MetaAggregator, RefusesAnAgentOfOtherSettings) {
+  const Experiment experiment = smallExperiment(), other = smallExperiment({"lambda:=0.01"});
+  ASSERT_NE(experiment.settingsHash(), other.settingsHash());
+  EXPECT_EQ(experiment.settingsHash(), smallExperiment({"pace:=3"}).settingsHash());
+  MetaAggregator aggregator(experiment);
+  const auto answer = aggregator.offer(makeUpdate(other, 1, 1));
+  EXPECT_EQ(answer.verdict, Verdict::kRefused);
+  EXPECT_NE(answer.reason.find("task 1 has other settings, of hash '" +
+                               other.settingsHash().substr(0, 20)),
+            std::string::npos)
+      << answer.reason;
+  EXPECT_NE(answer.reason.find("same settings file"), std::string::npos) << answer.reason;
+}
+
+TEST(MetaAggregator, ShowsAStrangersTextShortAndWithoutControlCharacters) {
+  const Experiment experiment = smallExperiment();
+  MetaAggregator aggregator(experiment);
+  auto update = makeUpdate(experiment, 0, 1);
+  update->run_id = "Z\n\x1b[31m[FATAL] forged" + std::string(1000000, 'z');
+  const std::string reason = aggregator.offer(update).reason;
+  EXPECT_LT(reason.size(), 200u);
+  EXPECT_EQ(reason.find_first_of("\n\x1b"), std::string::npos) << reason;
+}
+
+TEST(MetaAggregator, ARunWhoseTaskHasFailedGoesOnWithAQuorumAlone) {
+  MetaAggregator all(smallExperiment());
+  EXPECT_EQ(all.hopeless(), "");
+  EXPECT_TRUE(all.giveUp(1, "task 1 failed."));
+  EXPECT_FALSE(all.giveUp(1, "task 1 failed once more.")) << "it is known";
+  EXPECT_EQ(all.hopeless(), "task 1 failed.");
+
+  MetaAggregator two(smallExperiment({"quorum:=2"}));
+  two.giveUp(2, "task 2 failed.");
+  EXPECT_EQ(two.hopeless(), "") << "two of three are left";
+  two.giveUp(3, "a test task failed.");
+  EXPECT_EQ(two.hopeless(), "") << "it has no update to give";
+  two.giveUp(0, "task 0 failed.");
+  EXPECT_EQ(two.hopeless(), "task 0 failed.");
+
+  MetaAggregator tested(smallExperiment());
+  tested.giveUp(3, "a test task failed.");
+  EXPECT_EQ(tested.hopeless(), "a test task failed.") << "its returns are waited for";
 }
 
 }  // namespace

@@ -242,5 +242,50 @@ TEST(Resume, ACheckpointThatCannotBeWrittenStopsTheRunInOneSentence) {
             std::string::npos);
 }
 
+// a whole file, of this run, with a state that cannot be one
+struct Nonsense {
+  void saveState(StateWriter& writer) const { writer.count("round", 5); }
+  void loadState(StateReader&) {}
+};
+
+TEST(Resume, AStateThatDoesNotLoadFallsBackToTheOneBefore) {
+  const TempDir dir;
+  const Experiment whole = checkpointExperiment("table", dir / "whole", {"checkpoint.interval:=0"});
+  finish(whole);
+  for (const int task : {kAggregator, 0}) {
+    const Experiment killed = checkpointExperiment("table", dir / std::to_string(task));
+    runUntilCrash(killed, 5);
+    const CheckpointFolder folder(killed, task, TaskAgent(killed, std::max(task, 0)).layout());
+    folder.save(5, Nonsense());
+    EXPECT_EQ(resume(killed), 4);
+    EXPECT_TRUE(recordOf(killed) == recordOf(whole));
+  }
+}
+
+TEST(Resume, APartyLoadsTheNewestStateThatCanBeLoaded) {
+  const TempDir dir;
+  const Experiment killed = checkpointExperiment("table", dir.path());
+  runUntilCrash(killed, 5);
+  TaskAgent agent(killed, 0);
+  const CheckpointFolder folder(killed, 0, agent.layout());
+  folder.save(5, Nonsense());
+  int made = 0;
+  const auto fresh = [&]() -> TaskAgent& {
+    ++made;
+    agent = TaskAgent(killed, 0);
+    return agent;
+  };
+  std::vector<std::string> refused;
+  EXPECT_EQ(folder.loadNewest(6, fresh, refused), 4);
+  EXPECT_EQ(agent.round(), 4);
+  EXPECT_EQ(made, 2);
+  EXPECT_EQ(refused.size(), 1u);
+
+  folder.save(4, Nonsense());
+  folder.save(5, Nonsense());
+  EXPECT_EQ(folder.loadNewest(6, fresh, refused), 0);
+  EXPECT_EQ(agent.round(), 0) << "as before round 1";
+}
+
 }  // namespace
 }  // namespace pmeta

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -500,6 +502,74 @@ TEST(WriteFileAtomically, FailsWithASentenceAndLeavesNothing) {
   EXPECT_EQ(errorOf([&] { writeFileAtomically(dir / "full", "x"); }),
             "cannot write " + (dir / "full") + " (Is a directory).");
   EXPECT_EQ(namesIn(dir.path()), std::vector<std::string>{"full"});
+}
+
+TEST(RoundBook, RefusesWhatIsNoResult) {
+  const Experiment experiment = threeTasks();
+  RoundBook book(experiment);
+  constexpr std::int64_t kHuge = std::numeric_limits<std::int64_t>::max();
+  const std::vector<std::function<void(TaskReturn&)>> spoilers = {
+      [](TaskReturn& r) { r.mean = std::nan(""); },
+      [](TaskReturn& r) { r.mean = -HUGE_VAL; },
+      [](TaskReturn& r) { r.mean = 1e200; },
+      [](TaskReturn& r) { r.std = HUGE_VAL; },
+      [](TaskReturn& r) { r.std = -1; },
+      [](TaskReturn& r) { r.seconds = 1e308; },
+      [](TaskReturn& r) { r.seconds = -1; },
+      [](TaskReturn& r) { r.episodes = 0; },
+      [](TaskReturn& r) { r.env_steps = -500000; },
+      [](TaskReturn& r) { r.env_steps = kHuge; },
+      [](TaskReturn& r) { r.updates = kHuge; },
+      [](TaskReturn& r) { r.broken_episodes = -1; }};
+  for (std::size_t i = 0; i < spoilers.size(); ++i) {
+    TaskReturn spoiled = makeReturn(2, 1, Policy::kPersonal);
+    spoilers[i](spoiled);
+    EXPECT_EQ(errorOf([&] {
+                book.add(spoiled);
+              }).rfind("the return of task 1 in round 2 is no result: ", 0),
+              0u)
+        << i;
+  }
+  EXPECT_TRUE(book.add(makeReturn(2, 1, Policy::kPersonal))) << "its place is still free";
+  EXPECT_FALSE(book.add(makeReturn(2, 1, Policy::kPersonal))) << "a duplicate is none the less one";
+}
+
+TEST(RoundBook, CountersThatOverflowOnlyWhenTheyAreSummedAreRefused) {
+  const Experiment experiment = threeTasks();
+  RoundBook book(experiment);
+  TaskReturn large = makeReturn(1, 0, Policy::kPersonal);
+  large.env_steps = kMostCounted - 10;
+  EXPECT_TRUE(book.add(large));
+  TaskReturn more = makeReturn(2, 0, Policy::kPersonal);
+  more.env_steps = 11;
+  EXPECT_THROW(book.add(more), Error);
+  more.env_steps = 10;
+  EXPECT_TRUE(book.add(more));
+}
+
+TEST(RunLog, CountsEpisodesThatBrokeDownAndSaysWhyARunFailed) {
+  const TempDir dir;
+  const Experiment experiment = threeTasks({"results_dir:=" + dir.path()});
+  const auto manifest = [&] {
+    return nlohmann::json::parse(readFile(experiment.runDir() + "/manifest.json"));
+  };
+  RoundBook book(experiment);
+  RunLog log(experiment);
+  EXPECT_EQ(manifest()["broken_episodes"], 0);
+  for (int round = 1; round <= 2; ++round) {
+    for (int task = 0; task < 3; ++task) {
+      TaskReturn personal = makeReturn(round, task, Policy::kPersonal);
+      personal.broken_episodes = task;
+      book.add(personal);
+      book.add(makeReturn(round, task, Policy::kMeta));
+    }
+    book.closeRound(round, {0, 1, 2}, {}, 1);
+  }
+  for (const auto& round : book.take()) log.write(round);
+  log.fail("task 1 failed.");
+  EXPECT_EQ(manifest()["broken_episodes"], 6);
+  EXPECT_EQ(manifest()["status"], "failed");
+  EXPECT_EQ(manifest()["reason"], "task 1 failed.");
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <regex>
 
 #include "../support.h"
 #include "pmeta_core/run/meta_aggregator.h"
@@ -285,6 +286,73 @@ TEST(TaskAgent, TasksThatTheMetaPolicyLagsOnCountMore) {
   other.evaluateMeta(ahead);
   meta.round = 2;
   EXPECT_NEAR(other.trainRound(meta)->update.weight, std::pow(weight, 0.8), 1e-12);
+}
+
+// a round of training, from the initial meta-policy
+std::string trainingError(const Experiment& experiment) {
+  TaskAgent agent(experiment, 0);
+  try {
+    agent.trainRound(firstMeta(experiment));
+  } catch (const TaskFailed& failure) {
+    return failure.what();
+  }
+  return "(no failure)";
+}
+
+TEST(TaskAgent, ASimulationThatAlwaysBreaksDownFailsTheTask) {
+  const test::TempDir dir;
+  const std::string model =
+      std::regex_replace(test::readFile(PMETA_TEST_DATA "/../../config/models/walker2d.xml"),
+                         std::regex("timestep=\"[^\"]*\""), "timestep=\"0.05\"");
+  test::writeFile(dir / "walker2d.xml", model);
+  const Experiment experiment = Experiment::parse(
+      "learner: sac\nupdates_per_round: 3\n"
+      "sac: {hidden: [4], batch_size: 4, buffer_size: 100, warm_up_steps: 2000, "
+      "evaluation_episodes: 1}\n"
+      "environment: {name: walker_2d_params, model_file: " +
+          dir.path() + "/walker2d.xml}\n",
+      "walker.yaml");
+  const std::string error = trainingError(experiment);
+  EXPECT_NE(error.find(") failed in round 1: 10 episodes running have broken down, the last one in "
+                       "walker_2d_params, step "),
+            std::string::npos)
+      << error;
+  EXPECT_NE(error.find("; take a smaller timestep in the model (environment.model_file)"),
+            std::string::npos)
+      << error;
+}
+
+TEST(TaskAgent, TrainingThatDivergesFailsTheTaskBeforeAnythingIsSent) {
+  const Experiment dqn = Experiment::parse(
+      "learner: dqn\nupdates_per_round: 30\npersonal: {learning_rate: 1e30}\n"
+      "dqn: {hidden: [8], batch_size: 8, num_envs: 2, evaluation_episodes: 1}\n"
+      "environment: {name: cart_pole}\n",
+      "cart_pole.yaml");
+  std::string error = trainingError(dqn);
+  EXPECT_EQ(error.rfind("task 0 (" + dqn.family().taskName(0) + ") failed in round 1: ", 0), 0u)
+      << error;
+  EXPECT_NE(error.find("; lower personal.learning_rate (1e+30), personal.alpha"), std::string::npos)
+      << error;
+
+  const Experiment sac = Experiment::parse(
+      "learner: sac\nupdates_per_round: 30\npersonal: {learning_rate: 1e30}\n"
+      "sac: {hidden: [8], batch_size: 8, warm_up_steps: 20, evaluation_episodes: 1}\n"
+      "environment: {name: half_cheetah_dir, horizon: 20}\n",
+      "half_cheetah_dir.yaml");
+  error = trainingError(sac);
+  EXPECT_NE(error.find("; lower personal.learning_rate (1e+30)"), std::string::npos) << error;
+}
+
+TEST(TaskAgent, AMetaPolicyThatCannotBeEvaluatedFailsTheTask) {
+  const Experiment experiment = Experiment::parse(
+      "learner: sac\nsac: {hidden: [8], evaluation_episodes: 1}\n"
+      "environment: {name: half_cheetah_dir, horizon: 20}\n",
+      "half_cheetah_dir.yaml");
+  MetaPolicy meta = firstMeta(experiment);
+  meta.round = 1;
+  for (float& value : meta.model.floats()) value = 3e38f;
+  TaskAgent agent(experiment, 0);
+  EXPECT_THROW(agent.evaluateMeta(meta), TaskFailed);
 }
 
 }  // namespace

@@ -91,17 +91,19 @@ bool isPlainText(const std::string& text) {
   return true;
 }
 
-std::string shown(const std::string& text) {
+std::string shown(const std::string& text) { return "'" + plain(text, kMostShown) + "'"; }
+
+std::string plain(const std::string& text, std::size_t most) {
   std::string out;
   std::size_t at = 0;
   while (at < text.size()) {
     const std::size_t length = characterLength(text, at);
     const std::size_t taken = length == 0 ? 1 : length;
-    if (at + taken > kMostShown) break;
+    if (at + taken > most) break;
     out += length == 0 || isControl(text, at, length) ? "?" : text.substr(at, length);
     at += taken;
   }
-  return "'" + out + (at < text.size() ? "...'" : "'");
+  return at < text.size() ? out + "..." : out;
 }
 
 std::string padded(const std::string& text, std::size_t width, bool right) {

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 
 namespace pmeta {
 namespace {
@@ -49,16 +50,16 @@ ModelLayout::ModelLayout(Precision precision, std::vector<Block> blocks)
   std::set<std::string> names;
   for (const Block& block : blocks_) {
     if (block.name.empty() || block.name.find_first_of(" \t\n") != std::string::npos) {
-      throw Error("a model block needs a name without blanks, not '" + block.name + "'.");
+      throw Error("a model block needs a name without blanks, not " + shown(block.name) + ".");
     }
     if (!names.insert(block.name).second) {
-      throw Error("the model block '" + block.name + "' stands twice in one layout.");
+      throw Error("the model block " + shown(block.name) + " stands twice in one layout.");
     }
     std::size_t n = 1;
     text << block.name;
     for (const std::size_t extent : block.shape) {
       if (extent == 0 || n > kMaxScalars / extent) {
-        throw Error("the model block '" + block.name + "' has an impossible shape.");
+        throw Error("the model block " + shown(block.name) + " has an impossible shape.");
       }
       n *= extent;
       text << " " << extent;
@@ -86,7 +87,8 @@ ModelLayout ModelLayout::parse(const std::string& text) {
     words >> block.name;
     std::size_t extent = 0;
     while (words >> extent) block.shape.push_back(extent);
-    if (!words.eof()) throw Error("the layout of model block '" + block.name + "' is malformed.");
+    if (!words.eof())
+      throw Error("the layout of model block " + shown(block.name) + " is malformed.");
     blocks.push_back(std::move(block));
   }
   ModelLayout layout(precision, std::move(blocks));

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/env/env.h"
 
 namespace pmeta {
 namespace {
@@ -55,8 +56,9 @@ void MujocoSimulation::forward() {
 void MujocoSimulation::step(const double* action, int step) {
   for (int i = 0; i < nu_; ++i) {
     if (!std::isfinite(action[i])) {
-      refuse(step, "action[" + std::to_string(i) + "] (" +
-                       mj_id2name(model_->get(), mjOBJ_ACTUATOR, i) + ") is not finite");
+      throw Error(at(step) + "action[" + std::to_string(i) + "] (" +
+                  mj_id2name(model_->get(), mjOBJ_ACTUATOR, i) +
+                  ") is not finite; the episode cannot go on, reset it.");
     }
     control_[i] = std::clamp(action[i], -1.0, 1.0);
   }
@@ -101,30 +103,33 @@ void MujocoSimulation::check(int step) const {
     const int index = data_->warning[warning].lastinfo;
     const std::string place = "[" + std::to_string(index) + "]";
     if (warning == mjWARN_BADQPOS) {
-      refuse(step, "qpos" + place + jointOf(index, model_->get()->jnt_qposadr) +
-                       " is not finite or beyond 1e10");
+      broke(step, "qpos" + place + jointOf(index, model_->get()->jnt_qposadr) +
+                      " is not finite or beyond 1e10");
     }
     if (warning == mjWARN_BADQVEL || warning == mjWARN_BADQACC) {
-      refuse(step, (warning == mjWARN_BADQVEL ? "qvel" : "qacc") + place +
-                       jointOf(index, model_->get()->jnt_dofadr) + " is not finite or beyond 1e10");
+      broke(step, (warning == mjWARN_BADQVEL ? "qvel" : "qacc") + place +
+                      jointOf(index, model_->get()->jnt_dofadr) + " is not finite or beyond 1e10");
     }
-    refuse(step, std::string("MuJoCo says: ") + mju_warningText(warning, index));
+    broke(step, std::string("MuJoCo says: ") + mju_warningText(warning, index));
   }
   if (!allFinite(qpos_, nq_)) {
     const int index = firstNotFinite(qpos_, nq_);
-    refuse(step, "qpos[" + std::to_string(index) + "]" +
-                     jointOf(index, model_->get()->jnt_qposadr) + " is not finite");
+    broke(step, "qpos[" + std::to_string(index) + "]" + jointOf(index, model_->get()->jnt_qposadr) +
+                    " is not finite");
   }
   if (!allFinite(qvel_, nv_)) {
     const int index = firstNotFinite(qvel_, nv_);
-    refuse(step, "qvel[" + std::to_string(index) + "]" + jointOf(index, model_->get()->jnt_dofadr) +
-                     " is not finite");
+    broke(step, "qvel[" + std::to_string(index) + "]" + jointOf(index, model_->get()->jnt_dofadr) +
+                    " is not finite");
   }
 }
 
-void MujocoSimulation::refuse(int step, const std::string& what) const {
-  throw Error(environment_ + ", step " + std::to_string(step) + ": " + what +
-              "; the episode cannot go on, reset it.");
+void MujocoSimulation::broke(int step, const std::string& what) const {
+  throw BrokenEpisode(at(step) + what);
+}
+
+std::string MujocoSimulation::at(int step) const {
+  return environment_ + ", step " + std::to_string(step) + ": ";
 }
 
 // the joint that owns a number of the configuration or velocity

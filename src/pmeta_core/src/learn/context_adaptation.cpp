@@ -22,15 +22,20 @@ class Explorer {
         observation_(networks.observationSize()),
         action_(networks.actionSize()) {}
 
-  // one episode with that z
-  void run(const std::vector<float>& z, Rng& rng) {
-    Step step;
-    env_.reset(rng, observation_.data());
-    seen_.assign(observation_.begin(), observation_.end());
-    while (!step.terminated && !step.truncated) {
-      act(z, rng);
-      step = env_.step(action_.data(), rng, observation_.data());
-      keep(step);
+  // one episode with that z; false if it broke down
+  bool run(const std::vector<float>& z, Rng& rng) {
+    try {
+      Step step;
+      env_.reset(rng, observation_.data());
+      seen_.assign(observation_.begin(), observation_.end());
+      while (!step.terminated && !step.truncated) {
+        act(z, rng);
+        step = env_.step(action_.data(), rng, observation_.data());
+        keep(step);
+      }
+      return true;
+    } catch (const BrokenEpisode&) {
+      return false;
     }
   }
 
@@ -82,19 +87,21 @@ std::vector<Adaptation> adapt(const SacNetworks& networks, const ContextSettings
   LatentPosterior posterior;
   std::vector<Adaptation> known;
   std::vector<float> z(encoder.latentSize());
+  int broken = 0;  // since the last entry
   const std::vector<int>& counts = settings.exploration_episodes;
   for (int episode = 0;; ++episode) {
     encoder.infer(parameters + networks.encoderOffset(), explorer.context().data(), explorer.rows(),
                   workspace, posterior);
     if (std::count(counts.begin(), counts.end(), episode) > 0) {
-      known.push_back({episode, {posterior.mean.begin(), posterior.mean.end()}});
+      known.push_back({episode, {posterior.mean.begin(), posterior.mean.end()}, broken});
+      broken = 0;
     }
     if (counts.empty() || episode >= counts.back()) return known;
     for (std::size_t j = 0; j < z.size(); ++j) {
       z[j] =
           static_cast<float>(posterior.mean[j] + std::sqrt(posterior.variance[j]) * rng.normal());
     }
-    explorer.run(z, rng);
+    if (!explorer.run(z, rng)) ++broken;
   }
 }
 

@@ -103,21 +103,35 @@ void SacLearner::resetTargets(const float* parameters) {
 }
 
 std::int64_t SacLearner::collect(const float* parameters, Rng& rng, const float* explorer) {
-  int warm_up_steps = 0;
+  std::int64_t transitions = 0;
   if (!started_) {
     started_ = true;
-    warm_up_steps = settings_.warm_up_steps;
     beginEpisode(parameters, true, rng);
-    for (int t = 0; t < warm_up_steps; ++t) step(parameters, explorer, true, rng);
+    for (int t = 0; t < settings_.warm_up_steps; ++t) {
+      transitions += step(parameters, explorer, true, rng);
+    }
   }
-  for (int t = 0; t < settings_.env_steps_per_update; ++t) step(parameters, explorer, false, rng);
-  return warm_up_steps + settings_.env_steps_per_update;
+  for (int t = 0; t < settings_.env_steps_per_update; ++t) {
+    transitions += step(parameters, explorer, false, rng);
+  }
+  // an update needs one, and each step so far may have broken its episode
+  while (replay_.size() == 0) transitions += step(parameters, explorer, true, rng);
+  return transitions;
 }
 
 void SacLearner::beginEpisode(const float* parameters, bool warm_up, Rng& rng) {
-  env_->reset(rng, next_observation_.data());
+  for (bool started = false; !started;) {
+    try {
+      env_->reset(rng, next_observation_.data());
+      started = true;
+    } catch (const BrokenEpisode& episode) {
+      broken_.broke(episode);
+    }
+  }
   std::copy(next_observation_.begin(), next_observation_.end(), observation_.begin());
-  prior_episode_ = warm_up || episodes_ % settings_.context.prior_interval == 0;
+  // while no step has become context there is nothing else to draw from
+  prior_episode_ =
+      warm_up || context_.size() == 0 || episodes_ % settings_.context.prior_interval == 0;
   episodes_ += warm_up ? 0 : 1;
   if (!networks_.hasEncoder()) return;
   if (prior_episode_) {
@@ -128,7 +142,9 @@ void SacLearner::beginEpisode(const float* parameters, bool warm_up, Rng& rng) {
   task_input_ = update_inputs_[0];
 }
 
-void SacLearner::step(const float* parameters, const float* explorer, bool warm_up, Rng& rng) {
+// the transitions made: 1, or 0 where the episode broke down
+std::int64_t SacLearner::step(const float* parameters, const float* explorer, bool warm_up,
+                              Rng& rng) {
   if (warm_up) {
     for (float& a : action_float_) a = static_cast<float>(2 * rng.uniform() - 1);
   } else {
@@ -138,7 +154,14 @@ void SacLearner::step(const float* parameters, const float* explorer, bool warm_
     std::copy_n(acting_policy_.actions(), action_size_, action_float_.begin());
   }
   std::copy(action_float_.begin(), action_float_.end(), action_.begin());
-  const Step step = env_->step(action_.data(), rng, next_observation_.data());
+  Step step;
+  try {
+    step = env_->step(action_.data(), rng, next_observation_.data());
+  } catch (const BrokenEpisode& episode) {
+    broken_.broke(episode);
+    beginEpisode(parameters, warm_up, rng);
+    return 0;
+  }
   std::copy(next_observation_.begin(), next_observation_.end(), next_observation_float_.begin());
 
   Transition transition{observation_.data(), action_float_.data(), static_cast<float>(step.reward),
@@ -150,7 +173,11 @@ void SacLearner::step(const float* parameters, const float* explorer, bool warm_
     context_.add(transition);
   }
   std::swap(observation_, next_observation_float_);
-  if (step.terminated || step.truncated) beginEpisode(parameters, warm_up, rng);
+  if (step.terminated || step.truncated) {
+    broken_.ended();
+    beginEpisode(parameters, warm_up, rng);
+  }
+  return 1;
 }
 
 void SacLearner::sampleContext(float* rows, Rng& rng) {
@@ -349,6 +376,7 @@ void SacLearner::saveState(StateWriter& writer) const {
   writer.flag("started", started_);
   writer.count("updates", updates_);
   writer.count("episodes", episodes_);
+  writer.part("broken", broken_);
   writer.flag("prior_episode", prior_episode_);
   writer.array("targets", targets_);
   writer.part("temperature", temperature_);
@@ -364,6 +392,7 @@ void SacLearner::loadState(StateReader& reader) {
   started_ = reader.flag("started");
   updates_ = reader.count("updates");
   episodes_ = reader.count("episodes");
+  reader.part("broken", broken_);
   prior_episode_ = reader.flag("prior_episode");
   reader.array("targets", targets_);
   reader.part("temperature", temperature_);

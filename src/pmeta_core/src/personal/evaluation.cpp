@@ -15,22 +15,47 @@ Evaluation::Evaluation(std::vector<std::unique_ptr<Env>> envs)
       observations_(envs_.size() * observation_size_),
       actions_(envs_.size() * action_size_) {}
 
-ReturnStats Evaluation::run(const BatchPolicy& policy, Rng& rng) {
-  running_.resize(envs_.size());
-  for (std::size_t i = 0; i < envs_.size(); ++i) {
-    running_[i] = i;
-    returns_[i] = 0;
+// false: it broke down
+bool Evaluation::reset(std::size_t i, Rng& rng) {
+  try {
     envs_[i]->reset(rng, observation_.data());
-    std::copy(observation_.begin(), observation_.end(), &observations_[i * observation_size_]);
+    return true;
+  } catch (const BrokenEpisode&) {
+    return false;
+  }
+}
+
+// nothing: it broke down
+std::optional<Step> Evaluation::step(std::size_t i, const double* action, Rng& rng) {
+  try {
+    return envs_[i]->step(action, rng, observation_.data());
+  } catch (const BrokenEpisode&) {
+    return std::nullopt;
+  }
+}
+
+ReturnStats Evaluation::run(const BatchPolicy& policy, Rng& rng) {
+  ReturnStats stats;
+  running_.clear();
+  for (std::size_t i = 0; i < envs_.size(); ++i) {
+    returns_[i] = 0;
+    if (!reset(i, rng)) {
+      ++stats.broken_episodes;
+      continue;
+    }
+    std::copy(observation_.begin(), observation_.end(),
+              &observations_[running_.size() * observation_size_]);
+    running_.push_back(i);
   }
   while (!running_.empty()) {
     policy(observations_.data(), static_cast<int>(running_.size()), actions_.data());
     std::size_t kept = 0;
     for (std::size_t k = 0; k < running_.size(); ++k) {
       const std::size_t i = running_[k];
-      const Step step = envs_[i]->step(&actions_[k * action_size_], rng, observation_.data());
-      returns_[i] += step.evaluatedReward();
-      if (step.terminated || step.truncated) continue;
+      const std::optional<Step> step = this->step(i, &actions_[k * action_size_], rng);
+      if (!step) ++stats.broken_episodes;
+      if (step) returns_[i] += step->evaluatedReward();
+      if (!step || step->terminated || step->truncated) continue;
       // close up: kept <= k, so nothing unread is overwritten
       running_[kept] = i;
       std::copy(observation_.begin(), observation_.end(), &observations_[kept * observation_size_]);
@@ -39,7 +64,6 @@ ReturnStats Evaluation::run(const BatchPolicy& policy, Rng& rng) {
     running_.resize(kept);
   }
 
-  ReturnStats stats;
   stats.episodes = static_cast<int>(returns_.size());
   for (const double value : returns_) stats.mean += value;
   stats.mean /= stats.episodes;
@@ -67,13 +91,17 @@ Episode Evaluation::record(const BatchPolicy& policy, Rng& rng) {
   keep();
   while (!episode.terminated && !episode.truncated) {
     policy(observations_.data(), 1, actions_.data());
-    const Step step = env.step(actions_.data(), rng, observation_.data());
+    const std::optional<Step> step = this->step(0, actions_.data(), rng);
+    if (!step) {
+      episode.truncated = true;
+      break;
+    }
     keep();
     episode.actions.insert(episode.actions.end(), actions_.begin(),
                            actions_.begin() + static_cast<std::ptrdiff_t>(action_size_));
-    episode.rewards.push_back(step.evaluatedReward());
-    episode.terminated = step.terminated;
-    episode.truncated = step.truncated;
+    episode.rewards.push_back(step->evaluatedReward());
+    episode.terminated = step->terminated;
+    episode.truncated = step->truncated;
   }
   return episode;
 }

@@ -107,8 +107,10 @@ UpdateStats SacPersonalLearner::update(Rng& rng) {
   const HeldSignals held_signals;
   const float* parameters = personal_.floats().data();
   UpdateStats stats;
+  const std::int64_t broken_before = learner_.brokenEpisodes();
   stats.env_steps =
       learner_.collect(parameters, rng, explorer_.empty() ? nullptr : explorer_.data());
+  stats.broken_episodes = learner_.brokenEpisodes() - broken_before;
   optimizer_.beginUpdate();
   stats.loss = learner_.update(parameters, optimizer_, rng).critic;
   stats.updates = 1;
@@ -174,6 +176,7 @@ std::vector<AdaptedReturn> SacPersonalLearner::evaluateAdapted(const Model& poli
     returns.push_back({adaptation.episodes,
                        evaluation_->run(greedy(policy, adaptation.latent), same_starts),
                        adaptation.latent});
+    returns.back().stats.broken_episodes += adaptation.broken_episodes;
   }
   return returns;
 }

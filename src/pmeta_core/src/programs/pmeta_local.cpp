@@ -46,6 +46,9 @@ constexpr char kUsage[] =
                                        Run again to go on where it stopped: with the run that was
                                        cut off, or with --resume within it, from its checkpoints.
                                        --list tells the status of each run instead.
+                                       A run that fails keeps no other from being run: those are
+                                       listed at the end, the exit code is 1, and the same command
+                                       tries them again.
   convergence CONFIG [key:=value ...]  measure the theory's statements on known models
   check CONFIG [key:=value ...]        check the settings and print the effective ones as YAML
   key FILE                             make a key for key_file:=FILE; never overwrites
@@ -193,6 +196,12 @@ int run(Arguments arguments) {
       },
       point.round);
   log.finish(result.stopped ? "stopped" : "finished");
+  const std::int64_t broken =
+      result.rounds.empty() ? 0 : result.rounds.back().summary.broken_episodes;
+  if (broken > 0) {
+    std::cerr << broken << " episodes broke down: take a smaller timestep in the model, or a "
+              << "smaller learning_rate.\n";
+  }
   std::cout << console.table() << (result.stopped ? "stopped; " : "")
             << pmeta::listRunFolder(log.dir()) << std::flush;
   return result.stopped ? 130 : 0;
@@ -217,7 +226,7 @@ int sweep(Arguments arguments) {
   int elsewhere = 0;
   int done = 0;
   int total = 0;
-  const std::string folder =
+  const pmeta::SweepResult result =
       pmeta::runSweep(plan, g_stop, [&](const pmeta::SweepProgress& progress) {
         done = progress.done;
         total = progress.total;
@@ -236,10 +245,18 @@ int sweep(Arguments arguments) {
     std::cerr << elsewhere << " runs were left to whom else writes them: the same command sees to "
               << "what that leaves" << std::endl;
   }
-  const bool stopped = done + elsewhere < total;
-  std::cout << (stopped ? "stopped; the same command goes on. Runs in " : "runs in ") << folder
-            << std::endl;
-  return stopped ? 130 : (elsewhere > 0 ? 1 : 0);
+  const int failed = static_cast<int>(result.failures.size());
+  const bool stopped = done + elsewhere + failed < total;
+  std::cout << (stopped ? "stopped; the same command goes on. Runs in " : "runs in ")
+            << result.folder << std::endl;
+  for (const pmeta::SweepFailure& failure : result.failures) {
+    std::cerr << failure.run_id << ": " << failure.reason << "\n";
+  }
+  if (failed > 0) {
+    std::cerr << "pmeta: " << failed << " of " << total
+              << " runs failed; the same command tries them again." << std::endl;
+  }
+  return stopped ? 130 : (elsewhere + failed > 0 ? 1 : 0);
 }
 
 int check(Arguments arguments) {

@@ -106,11 +106,12 @@ Mac Authenticator::mac(const AuxiliaryUpdate& update) const {
 }
 
 Mac Authenticator::mac(const AuxiliaryUpdate& header, const ModelView& model) const {
-  Stream stream(key_, "pmeta AuxiliaryUpdate 1");
+  Stream stream(key_, "pmeta AuxiliaryUpdate 2");
   stream.put(std::string_view(header.run_id));
   stream.put(header.task);
   stream.put(header.round);
   stream.put(header.weight);
+  stream.put(std::string_view(header.settings_hash));
   stream.put(model);
   return stream.finish();
 }
@@ -120,7 +121,7 @@ Mac Authenticator::mac(const MetaPolicy& meta, int rounds) const {
 }
 
 Mac Authenticator::mac(const MetaPolicy& header, const ModelView& model, int rounds) const {
-  Stream stream(key_, "pmeta MetaPolicy 1");
+  Stream stream(key_, "pmeta MetaPolicy 2");
   stream.put(std::string_view(header.run_id));
   stream.put(header.round);
   stream.put(rounds);
@@ -128,12 +129,13 @@ Mac Authenticator::mac(const MetaPolicy& header, const ModelView& model, int rou
   stream.put(header.incarnation);
   stream.put(static_cast<int>(header.evaluate));
   stream.put(static_cast<int>(header.checkpoint));
+  stream.put(std::string_view(header.settings_hash));
   stream.put(model);
   return stream.finish();
 }
 
 Mac Authenticator::mac(const TaskReturn& result, const std::string& task_name) const {
-  Stream stream(key_, "pmeta TaskReturn 1");
+  Stream stream(key_, "pmeta TaskReturn 2");
   stream.put(std::string_view(result.run_id));
   stream.put(result.task);
   stream.put(std::string_view(task_name));
@@ -147,7 +149,18 @@ Mac Authenticator::mac(const TaskReturn& result, const std::string& task_name) c
   stream.put(result.episodes);
   stream.put(result.env_steps);
   stream.put(result.updates);
+  stream.put(result.broken_episodes);
   stream.put(result.seconds);
+  return stream.finish();
+}
+
+Mac Authenticator::mac(const AgentNews& news) const {
+  Stream stream(key_, "pmeta AgentStatus 1");
+  stream.put(std::string_view(news.run_id));
+  stream.put(news.task);
+  stream.put(std::uint32_t{news.state});
+  stream.put(std::string_view(news.message));
+  stream.put(news.incarnation);
   return stream.finish();
 }
 

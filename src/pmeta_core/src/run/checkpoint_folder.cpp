@@ -94,9 +94,9 @@ void CheckpointFolder::read(int round, const std::function<void(StateReader&)>& 
 }
 
 int newestCommonRound(const std::vector<CheckpointFolder>& folders,
-                      std::vector<std::string>& refused) {
+                      std::vector<std::string>& refused, int at_most) {
   // whoever has less sets the others back
-  int common = folders.empty() ? 0 : std::numeric_limits<int>::max();
+  int common = folders.empty() ? 0 : at_most;
   for (int before = 0; common != before;) {
     before = common;
     for (const CheckpointFolder& folder : folders) common = folder.newest(common, refused);

@@ -1,6 +1,7 @@
 #include "pmeta_core/run/local_runner.h"
 
 #include <chrono>
+#include <limits>
 #include <stdexcept>
 
 #include "pmeta_core/base/error.h"
@@ -178,17 +179,24 @@ LocalResult runLocally(const Experiment& experiment, RunLog* log, const OnRound&
 
 ResumePoint findResumePoint(const Experiment& experiment) {
   requireUnfinished(experiment.runDir());
-  LocalRun run(experiment);
   ResumePoint point;
-  point.round = newestCommonRound(run.folders(), point.refused);
-  if (point.round == 0) {
-    throw Error("there is no round of which all parties have a good checkpoint in " +
-                experiment.runDir() + ": begin a new run" +
-                (point.refused.empty() ? "." : " (" + point.refused.front() + ")"));
+  for (int at_most = std::numeric_limits<int>::max();; at_most = point.round - 1) {
+    LocalRun run(experiment);
+    point.round = newestCommonRound(run.folders(), point.refused, at_most);
+    if (point.round == 0) {
+      throw Error("there is no round of which all parties have a good checkpoint in " +
+                  experiment.runDir() + ": begin a new run" +
+                  (point.refused.empty() ? "." : " (" + point.refused.front() + ")"));
+    }
+    try {
+      run.loadCheckpoints(point.round);
+      point.rounds_done = run.roundsTaken();
+      return point;
+    } catch (const Error& error) {
+      // whole and of this run, but of no state that it can be in: the one before may be
+      point.refused.emplace_back(error.what());
+    }
   }
-  run.loadCheckpoints(point.round);
-  point.rounds_done = run.roundsTaken();
-  return point;
 }
 
 }  // namespace pmeta

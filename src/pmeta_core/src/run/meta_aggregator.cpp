@@ -1,17 +1,15 @@
 #include "pmeta_core/run/meta_aggregator.h"
 
 #include <cmath>
+#include <iterator>
 
 #include "pmeta_core/aggregate/mix.h"
 #include "pmeta_core/aggregate/trimmed_mix.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
+#include "pmeta_core/run/divergence.h"
 
 namespace pmeta {
-namespace {
-
-constexpr double kLargest = 1e150;  ///< sums of larger values, with their weights, could overflow
-
-}  // namespace
 
 MetaAggregator::MetaAggregator(const Experiment& experiment)
     : rounds_(experiment.settings().rounds),
@@ -23,6 +21,7 @@ MetaAggregator::MetaAggregator(const Experiment& experiment)
       norms_(experiment.numTasks(), 0),
       counts_(experiment.numTasks()) {
   meta_.run_id = experiment.settings().run_id;
+  meta_.settings_hash = experiment.settingsHash();
   meta_.model = experiment.makeLearner(0)->initialModel(
       static_cast<std::uint64_t>(experiment.settings().seed));
 }
@@ -48,6 +47,20 @@ MetaAggregator::Answer MetaAggregator::offer(std::shared_ptr<const AuxiliaryUpda
   return {};
 }
 
+bool MetaAggregator::giveUp(int task, const std::string& reason) {
+  return failures_.emplace(task, reason).second;
+}
+
+std::string MetaAggregator::hopeless() const {
+  if (failures_.empty()) return "";
+  const int tasks = static_cast<int>(updates_.size());
+  // training tasks come first
+  const auto lost =
+      static_cast<int>(std::distance(failures_.begin(), failures_.lower_bound(tasks)));
+  if (quorum_ < tasks && tasks - lost >= quorum_) return "";
+  return failures_.begin()->second;
+}
+
 void MetaAggregator::countRefusal(int task, const std::string& reason) {
   if (task < 0 || task >= static_cast<int>(counts_.size())) {
     ++refused_unknown_;
@@ -60,10 +73,14 @@ void MetaAggregator::countRefusal(int task, const std::string& reason) {
 std::string MetaAggregator::refusal(const AuxiliaryUpdate& update) const {
   const std::string who = "task " + std::to_string(update.task);
   if (update.run_id != meta_.run_id) {
-    return who + " belongs to run '" + update.run_id + "', not to '" + meta_.run_id + "'.";
+    return who + " belongs to run " + shown(update.run_id) + ", not to " + shown(meta_.run_id) +
+           ".";
   }
   if (update.task < 0 || update.task >= static_cast<int>(updates_.size())) {
     return who + " is not one of this run's " + std::to_string(updates_.size()) + " tasks.";
+  }
+  if (update.settings_hash != meta_.settings_hash) {
+    return otherSettings(who, update.settings_hash, meta_.settings_hash);
   }
   if (update.round > meta_.round + 1) {
     return who + " reports round " + std::to_string(update.round) + " but round " +
@@ -81,15 +98,8 @@ std::string MetaAggregator::refusal(const AuxiliaryUpdate& update) const {
   } catch (const Error& error) {
     return error.what();
   }
-  if (const auto* values = std::get_if<std::vector<double>>(&update.model.values)) {
-    for (std::size_t k = 0; k < values->size(); ++k) {
-      if (!update.model.isPresent(k) || std::abs((*values)[k]) <= kLargest) continue;
-      return who + " sent " + formatNumber((*values)[k]) + " (entry " + std::to_string(k) +
-             "), which is beyond " + formatNumber(kLargest) +
-             ": has its training diverged? Lower alpha or lambda.";
-    }
-  }
-  return "";
+  const std::string diverged = divergence(update.model);
+  return diverged.empty() ? "" : who + " sent parameters that have diverged: " + diverged + ".";
 }
 
 std::vector<int> MetaAggregator::reported() const {

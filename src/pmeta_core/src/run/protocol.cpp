@@ -4,6 +4,8 @@
 #include <functional>
 #include <limits>
 
+#include "pmeta_core/base/format.h"
+
 namespace pmeta {
 namespace {
 
@@ -32,6 +34,14 @@ std::vector<int> readTasks(StateReader& reader, const std::string& name) {
 const char* name(Policy policy) { return policy == Policy::kPersonal ? "personal" : "meta"; }
 const char* name(Split split) { return split == Split::kTrain ? "train" : "test"; }
 
+std::string otherSettings(const std::string& who, const std::string& theirs,
+                          const std::string& ours) {
+  return who + " has other settings, of hash " + shown(theirs) + " where this party's is " +
+         shown(ours) +
+         ": start both with the same settings file and overrides, those of the run folder's "
+         "config.yaml.";
+}
+
 void TaskReturn::saveState(StateWriter& writer) const {
   const std::vector<std::int64_t> counts = {task,
                                             round,
@@ -41,14 +51,15 @@ void TaskReturn::saveState(StateWriter& writer) const {
                                             episodes,
                                             env_steps,
                                             updates,
-                                            scheduled};
+                                            scheduled,
+                                            broken_episodes};
   const std::vector<double> numbers = {mean, std, seconds};
   writer.array("counts", counts);
   writer.array("numbers", numbers);
 }
 
 void TaskReturn::loadState(StateReader& reader) {
-  std::vector<std::int64_t> counts(9);
+  std::vector<std::int64_t> counts(10);
   std::vector<double> numbers(3);
   reader.counts("counts", counts);
   reader.array("numbers", numbers);
@@ -65,6 +76,7 @@ void TaskReturn::loadState(StateReader& reader) {
   env_steps = counts[6];
   updates = counts[7];
   scheduled = counts[8] != 0;
+  broken_episodes = counts[9];
   mean = numbers[0];
   std = numbers[1];
   seconds = numbers[2];

@@ -22,6 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::seconds kManifestInterval{1};
+constexpr double kLargestResult = 1e150;  ///< of which a mean over tasks is still finite
 
 double meanReturn(const std::vector<RoundRow>& rows, Policy policy, Split split, int context) {
   double sum = 0;
@@ -47,6 +48,7 @@ std::string constantManifest(const Experiment& experiment, const std::string& st
   manifest["reason"] = nullptr;
   manifest["rounds_done"] = nullptr;
   manifest["rounds"] = e.rounds;
+  manifest["broken_episodes"] = nullptr;
   manifest["started"] = started;
   manifest["ended"] = nullptr;
   manifest["host"] = hostName();
@@ -144,7 +146,45 @@ bool RoundBook::add(const TaskReturn& result) {
   }
   const auto key =
       std::make_tuple(static_cast<int>(result.policy), result.task, result.context_episodes);
+  const auto open = open_.find(result.round);
+  if (open != open_.end() && open->second.results.count(key) != 0) return false;
+  requireResult(result);
   return open_[result.round].results.emplace(key, result).second;
+}
+
+// the sums that rounds.csv and the manifest hold must be counts too
+void RoundBook::requireResult(const TaskReturn& result) const {
+  const auto refuse = [&](const std::string& why) {
+    throw Error("the return of task " + std::to_string(result.task) + " in round " +
+                std::to_string(result.round) + " is no result: " + why + ".");
+  };
+  for (const double value : {result.mean, result.std, result.seconds}) {
+    if (!std::isfinite(value) || std::abs(value) > kLargestResult) {
+      refuse("it holds " + formatNumber(value));
+    }
+  }
+  if (result.std < 0 || result.seconds < 0 || result.seconds > kMostCounted) {
+    refuse("its deviation is " + formatNumber(result.std) + ", its wall time " +
+           formatNumber(result.seconds) + " s");
+  }
+  if (result.episodes < 1) refuse("it is of " + std::to_string(result.episodes) + " episodes");
+  std::int64_t env_steps = env_steps_[result.task];
+  std::int64_t updates = updates_[result.task];
+  std::int64_t broken = broken_episodes_;
+  const auto count = [&](const TaskReturn& r) {
+    for (const auto& [sum, more] : {std::pair{&env_steps, r.env_steps},
+                                    {&updates, r.updates},
+                                    {&broken, r.broken_episodes}}) {
+      if (more < 0 || more > kMostCounted - *sum) refuse("its counts are beyond those of any run");
+      *sum += more;
+    }
+  };
+  for (const auto& [round, open] : open_) {
+    for (const auto& [key, other] : open.results) {
+      if (other.task == result.task) count(other);
+    }
+  }
+  count(result);
 }
 
 void RoundBook::closeRound(int round, const std::vector<int>& participants,
@@ -203,8 +243,10 @@ std::vector<RoundBook::Round> RoundBook::take(bool force) {
       row.result = entry.second;
       row.env_steps = env_steps_[row.result.task] += row.result.env_steps;
       row.updates = updates_[row.result.task] += row.result.updates;
+      broken_episodes_ += row.result.broken_episodes;
       round.rows.push_back(std::move(row));
     }
+    round.summary.broken_episodes = broken_episodes_;
     seconds_ += round.summary.seconds;
     round.summary.personal_return = meanReturn(round.rows, Policy::kPersonal, Split::kTrain, 0);
     const int context = contexts_.back();
@@ -251,6 +293,7 @@ void RoundBook::saveState(StateWriter& writer) const {
   writer.count("rounds_taken", roundsTaken());
   writer.array("env_steps", env_steps_);
   writer.array("updates", updates_);
+  writer.count("broken_episodes", broken_episodes_);
   writer.value("seconds", seconds_);
   std::int64_t closed = 0;
   std::int64_t returns = 0;
@@ -269,6 +312,7 @@ void RoundBook::loadState(StateReader& reader) {
   next_ = static_cast<int>(reader.count("rounds_taken", 0, rounds_)) + 1;
   reader.counts("env_steps", env_steps_);
   reader.counts("updates", updates_);
+  broken_episodes_ = reader.count("broken_episodes");
   seconds_ = reader.value<double>("seconds");
   const std::int64_t closed = reader.count("closed", 0, rounds_);
   for (std::int64_t k = 0; k < closed; ++k) {
@@ -330,6 +374,10 @@ RunLog RunLog::reopen(const Experiment& experiment, int rounds_done, RunLock loc
   requireUnfinished(dir);
   const std::string started = manifestText(dir, "started");
   RunLog log(experiment, started.empty() ? utcTime() : started, rounds_done, std::move(lock));
+  const auto before = Json::parse(std::ifstream(dir + "/manifest.json"), nullptr, false);
+  if (before.contains("broken_episodes") && before["broken_episodes"].is_number_integer()) {
+    log.broken_episodes_ = before["broken_episodes"].get<std::int64_t>();
+  }
   requireWritable(dir);
   const EvaluationSchedule evaluations = experiment.evaluationSchedule();
   int evaluated = rounds_done;
@@ -372,6 +420,7 @@ void RunLog::write(const RoundBook::Round& round) {
   }
   csv_size_ += lines.size();
   rounds_done_ = round.summary.round;
+  broken_episodes_ = round.summary.broken_episodes;
   if (Clock::now() < next_manifest_) return;
   try {
     writeManifest("running");
@@ -414,6 +463,7 @@ void RunLog::writeManifest(const std::string& status, const std::string& reason)
     manifest["reason"] = reason;
   }
   manifest["rounds_done"] = rounds_done_;
+  manifest["broken_episodes"] = broken_episodes_;
   if (status != "running") manifest["ended"] = utcTime();
   // a reason may hold anything
   writeFileAtomically(dir_ + "/manifest.json",

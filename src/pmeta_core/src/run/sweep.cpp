@@ -65,7 +65,7 @@ std::optional<BegunRun> beginRun(const Experiment& experiment, bool resume) {
 
 }  // namespace
 
-std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
+SweepResult runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
                      const std::function<void(const SweepProgress&)>& on_progress) {
   const std::vector<Experiment> runs = planSweep(plan);
   const std::string folder = runs.front().settings().results_dir;
@@ -100,13 +100,12 @@ std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
   const Clock::time_point begin = Clock::now();
   std::mutex mutex;
   std::atomic<std::size_t> next{0};
-  std::atomic<bool> failed{false};
   double done_here = 0;
-  std::exception_ptr failure;
+  std::map<std::size_t, SweepFailure> failures;  // by place in `open`
   const auto work = [&] {
-    try {
-      for (std::size_t i = next++; i < open.size() && !stop && !failed; i = next++) {
-        const Clock::time_point start = Clock::now();
+    for (std::size_t i = next++; i < open.size() && !stop; i = next++) {
+      const Clock::time_point start = Clock::now();
+      try {
         std::optional<BegunRun> run;
         std::string in_use;
         try {
@@ -134,18 +133,19 @@ std::string runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
         progress.seconds = secondsSince(start);
         progress.eta_seconds = secondsSince(begin) / done_here * (runs.size() - progress.done);
         on_progress(progress);
+      } catch (const std::exception& error) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        ++done_here;
+        failures[i] = {open[i]->settings().run_id, error.what()};
       }
-    } catch (...) {
-      const std::lock_guard<std::mutex> lock(mutex);
-      if (!failure) failure = std::current_exception();
-      failed = true;
     }
   };
   std::vector<std::thread> threads;
   for (int j = 0; j < plan.jobs; ++j) threads.emplace_back(work);
   for (std::thread& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
-  return folder;
+  SweepResult result{folder, {}};
+  for (auto& [place, failure] : failures) result.failures.push_back(std::move(failure));
+  return result;
 }
 
 }  // namespace pmeta

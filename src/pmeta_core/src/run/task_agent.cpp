@@ -28,6 +28,10 @@ constexpr double kMostLogWeight = 100;  // catch_up / (1 - kWeightMemory) is at 
 
 TaskAgent::TaskAgent(const Experiment& experiment, int task)
     : run_id_(experiment.settings().run_id),
+      settings_hash_(experiment.settingsHash()),
+      name_("task " + std::to_string(task) + " (" + experiment.family().taskName(task) + ")"),
+      step_sizes_(stepSizes(experiment.settings())),
+      simulation_settings_(simulationSettings(experiment.settings())),
       seed_(static_cast<std::uint64_t>(experiment.settings().seed)),
       task_(task),
       split_(experiment.isTestTask(task) ? Split::kTest : Split::kTrain),
@@ -38,6 +42,22 @@ TaskAgent::TaskAgent(const Experiment& experiment, int task)
       catch_up_(experiment.settings().aggregation.catch_up),
       learner_(experiment.makeLearner(task)) {}
 
+// a learner's errors, with what else there is to know; it is always the same that comes of them
+template <class Work>
+auto TaskAgent::guarded(int round, const Work& work) const {
+  try {
+    return work();
+  } catch (const TaskFailed&) {
+    throw;
+  } catch (const BrokenEpisode& episode) {
+    fail(round, episode.reason(), simulation_settings_);
+  } catch (const Error& error) {
+    std::string what = error.what();
+    if (!what.empty() && what.back() == '.') what.pop_back();
+    fail(round, what, step_sizes_);
+  }
+}
+
 std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& meta,
                                                             const KeepGoing& keep_going) {
   if (!trains()) throw Error("task " + std::to_string(task_) + " is a test task: not trained on.");
@@ -45,33 +65,32 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   const Stopwatch watch;
   const int round = meta.round + 1;
   if (between_ && round_ > 0 && round == round_) return lastResult();
-  Rng rng(seed_, task_, Stream::kSample, round);
 
   RoundResult result;
   between_ = false;
   learner_->beginRound(meta.model, keeps_personal_);
-  for (int r = 1; r <= updates_per_round_; ++r) {
-    const UpdateStats stats = learner_->update(rng);
-    result.env_steps += stats.env_steps;
-    result.updates += stats.updates;
-    result.loss = stats.loss;
-    if (keep_going && !keep_going(r)) return std::nullopt;
-  }
+  if (!guarded(round, [&] { return train(round, keep_going, result); })) return std::nullopt;
 
   result.distance = distance(learner_->personal(), meta.model);
+  if (!std::isfinite(result.distance)) fail(round, "its personal parameters diverged", step_sizes_);
+  const std::string diverged = divergence(sent());
+  if (!diverged.empty()) fail(round, "its parameters diverged, " + diverged, step_sizes_);
   env_steps_ += result.env_steps;
   updates_ += result.updates;
+  unreported_broken_ += result.broken_episodes;
   const bool scheduled = evaluations_.includes(round);
   if (scheduled || meta.evaluate) {
     Rng evaluation = evaluationRng();
-    TaskReturn personal =
-        makeReturn(round, Policy::kPersonal, learner_->evaluate(learner_->personal(), evaluation));
+    TaskReturn personal = makeReturn(round, Policy::kPersonal, guarded(round, [&] {
+                                       return learner_->evaluate(learner_->personal(), evaluation);
+                                     }));
+    personal.broken_episodes += unreported_broken_;
     personal.scheduled = scheduled;
     personal.env_steps = env_steps_;
     personal.updates = updates_;
     personal.seconds = watch.seconds();
     if (scheduled) {
-      env_steps_ = updates_ = 0;
+      env_steps_ = updates_ = unreported_broken_ = 0;
       adjustWeight(personal.mean);
     }
     result.personal = std::move(personal);
@@ -82,12 +101,44 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   return lastResult();
 }
 
+// the round's updates; false if stopped
+bool TaskAgent::train(int round, const KeepGoing& keep_going, RoundResult& result) {
+  Rng rng(seed_, task_, Stream::kSample, round);
+  for (int r = 1; r <= updates_per_round_; ++r) {
+    const UpdateStats stats = learner_->update(rng);
+    result.env_steps += stats.env_steps;
+    result.updates += stats.updates;
+    result.loss = stats.loss;
+    result.broken_episodes += stats.broken_episodes;
+    broken_episodes_ += stats.broken_episodes;
+    if (!std::isfinite(stats.loss)) {
+      fail(round, "the loss of update " + std::to_string(r) + " is " + formatNumber(stats.loss),
+           step_sizes_);
+    }
+    if (keep_going && !keep_going(r)) return false;
+  }
+  return true;
+}
+
+// a simulation that breaks down now and then gives wild numbers before it does
+void TaskAgent::fail(int round, const std::string& what, const std::string& advice) const {
+  const bool broke = broken_episodes_ > 0 && advice != simulation_settings_;
+  throw TaskFailed(name_ + " failed in round " + std::to_string(round) + ": " + what + "; " +
+                   advice +
+                   (broke ? "; or, since " + std::to_string(broken_episodes_) +
+                                " of its episodes broke down, " + simulation_settings_
+                          : "") +
+                   ".");
+}
+
 TaskAgent::RoundResult TaskAgent::lastResult() const {
   RoundResult result = last_;
-  result.update = {run_id_, task_, round_,
-                   sends_personal_ ? learner_->personal() : learner_->auxiliary(),
-                   std::exp(log_weight_)};
+  result.update = {run_id_, task_, round_, sent(), std::exp(log_weight_), settings_hash_};
   return result;
+}
+
+const Model& TaskAgent::sent() const {
+  return sends_personal_ ? learner_->personal() : learner_->auxiliary();
 }
 
 std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) {
@@ -97,7 +148,8 @@ std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) {
   if (!scheduled && !meta.evaluate) return results;
   const Stopwatch watch;
   Rng rng = evaluationRng();
-  const std::vector<AdaptedReturn> all = learner_->evaluateAdapted(meta.model, rng);
+  const std::vector<AdaptedReturn> all =
+      guarded(meta.round, [&] { return learner_->evaluateAdapted(meta.model, rng); });
   for (const AdaptedReturn& adapted : all) {
     results.push_back(makeReturn(meta.round, Policy::kMeta, adapted.stats));
     results.back().scheduled = scheduled;
@@ -123,6 +175,7 @@ ReturnStats TaskAgent::evaluateFresh(Policy kind, const Model& policy, int episo
     total.mean += share * (stats.mean - total.mean);
     mean_of_squares += share * (stats.mean * stats.mean + stats.std * stats.std - mean_of_squares);
     total.episodes += stats.episodes;
+    total.broken_episodes += stats.broken_episodes;
   }
   total.std = std::sqrt(std::max(0.0, mean_of_squares - total.mean * total.mean));
   return total;
@@ -137,6 +190,8 @@ void TaskAgent::saveState(StateWriter& writer) const {
   writer.count("round", round_);
   writer.count("env_steps", env_steps_);
   writer.count("updates", updates_);
+  writer.count("unreported_broken", unreported_broken_);
+  writer.count("broken_episodes", broken_episodes_);
   writer.value("log_weight", log_weight_);
   writer.flag("has_meta_return", meta_return_.has_value());
   writer.value("meta_return", meta_return_.value_or(0));
@@ -149,6 +204,8 @@ void TaskAgent::loadState(StateReader& reader) {
   round_ = static_cast<int>(reader.count("round", 0, evaluations_.rounds));
   env_steps_ = reader.count("env_steps");
   updates_ = reader.count("updates");
+  unreported_broken_ = reader.count("unreported_broken");
+  broken_episodes_ = reader.count("broken_episodes");
   log_weight_ = reader.finite("log_weight");
   if (std::abs(log_weight_) > kMostLogWeight) reader.refuse("log_weight", "is out of its range");
   const auto meta_return = reader.value<double>("meta_return");
@@ -168,6 +225,7 @@ void TaskAgent::loadState(StateReader& reader) {
 void TaskAgent::RoundResult::saveState(StateWriter& writer) const {
   writer.count("env_steps", env_steps);
   writer.count("updates", updates);
+  writer.count("broken_episodes", broken_episodes);
   writer.value("loss", loss);
   writer.value("distance", distance);
   writer.flag("evaluated", personal.has_value());
@@ -177,6 +235,7 @@ void TaskAgent::RoundResult::saveState(StateWriter& writer) const {
 void TaskAgent::RoundResult::loadState(StateReader& reader) {
   env_steps = reader.count("env_steps");
   updates = reader.count("updates");
+  broken_episodes = reader.count("broken_episodes");
   loss = reader.value<double>("loss");
   distance = reader.value<double>("distance");
   personal.reset();
@@ -210,7 +269,14 @@ void TaskAgent::adjustWeight(double personal_return) {
 // the same draws for every policy and round: differences are the policies', not the dice's
 Rng TaskAgent::evaluationRng() const { return Rng(seed_, task_, Stream::kEvaluate); }
 
-TaskReturn TaskAgent::makeReturn(int round, Policy policy, const ReturnStats& stats) const {
+TaskReturn TaskAgent::makeReturn(int round, Policy policy, const ReturnStats& stats) {
+  broken_episodes_ += stats.broken_episodes;
+  if (!std::isfinite(stats.mean) || !std::isfinite(stats.std)) {
+    fail(round,
+         std::string("the return of the ") + name(policy) + " policy is " +
+             formatNumber(stats.mean) + " +- " + formatNumber(stats.std),
+         step_sizes_);
+  }
   TaskReturn result;
   result.run_id = run_id_;
   result.task = task_;
@@ -220,6 +286,7 @@ TaskReturn TaskAgent::makeReturn(int round, Policy policy, const ReturnStats& st
   result.mean = stats.mean;
   result.std = stats.std;
   result.episodes = stats.episodes;
+  result.broken_episodes = stats.broken_episodes;
   return result;
 }
 

@@ -81,6 +81,7 @@ QLabel* RunPanel::addLabel(const QString& name, const QString& style) {
   label->setObjectName(name);
   label->setStyleSheet(style);
   label->setWordWrap(true);
+  label->setTextFormat(Qt::PlainText);  // what comes by messages is no markup
   return label;
 }
 

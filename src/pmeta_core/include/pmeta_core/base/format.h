@@ -28,6 +28,9 @@ bool isPlainText(const std::string& text);
 /// character), with a ? for each control character and each byte that is not UTF-8.
 std::string shown(const std::string& text);
 
+/// The same without quotes, and cut after `most` bytes: for a whole sentence of unknown origin.
+std::string plain(const std::string& text, std::size_t most);
+
 /// The text with blanks up to `width` after it, or before it if `right`.
 std::string padded(const std::string& text, std::size_t width, bool right = false);
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pmeta_core/base/error.h"
 #include "pmeta_core/base/rng.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/base/state.h"
@@ -34,6 +35,20 @@ struct Step {
   double evaluatedReward() const { return sparse_reward.value_or(reward); }
 };
 
+/// A simulation broke down (a state that is not finite, say): the episode is over, and the step
+/// that broke it gave nothing. reset() begins another.
+class BrokenEpisode : public Error {
+ public:
+  /// `reason`: a clause that names the environment, the step and the quantity.
+  explicit BrokenEpisode(const std::string& reason)
+      : Error(reason + "; the episode cannot go on, reset it."), reason_(reason) {}
+
+  const std::string& reason() const { return reason_; }
+
+ private:
+  std::string reason_;
+};
+
 /// One MDP. All randomness comes in as an argument; the state is the only thing that is kept.
 class Env {
  public:
@@ -41,7 +56,8 @@ class Env {
 
   virtual const EnvSpec& spec() const = 0;
 
-  /// Draws a start state and writes its observation (spec().observation_size numbers).
+  /// Draws a start state and writes its observation (spec().observation_size numbers). Throws
+  /// BrokenEpisode, as step() does, where there is a simulation that can break down.
   virtual void reset(Rng& rng, double* observation) = 0;
 
   /// Acts once. A discrete action a is passed as action[0] == a.

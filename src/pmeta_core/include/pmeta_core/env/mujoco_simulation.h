@@ -13,8 +13,7 @@ namespace pmeta {
 /// One running simulation of a model, which others may share.
 ///
 /// What MuJoCo would report as a warning (a state that is not finite or beyond 1e10, too many
-/// contacts) throws an Error that names the environment, the step and the quantity; after that,
-/// clear() or setState().
+/// contacts) throws BrokenEpisode; after that, clear() or setState().
 class MujocoSimulation {
  public:
   /// `environment` is for errors; a step makes `frame_skip` of the model's timesteps.
@@ -46,8 +45,8 @@ class MujocoSimulation {
   /// normalises quaternions on the way.
   void forward();
 
-  /// Steps with `action` (nu numbers, clipped to [-1, 1]); `step` is its number, for errors, which
-  /// also refuse an action that is not finite.
+  /// Steps with `action` (nu numbers, clipped to [-1, 1]); `step` is its number, for errors. Throws
+  /// Error on an action that is not finite: that is no fault of the simulation.
   void step(const double* action, int step);
 
   /// Works out contactForces() from the last step; changes nothing that later steps depend on.
@@ -68,7 +67,8 @@ class MujocoSimulation {
 
  private:
   void check(int step) const;
-  [[noreturn]] void refuse(int step, const std::string& what) const;
+  [[noreturn]] void broke(int step, const std::string& what) const;
+  std::string at(int step) const;
   std::string jointOf(int index, const int* addresses) const;
 
   struct Delete {

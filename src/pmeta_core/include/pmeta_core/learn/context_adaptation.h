@@ -12,6 +12,8 @@ namespace pmeta {
 struct Adaptation {
   int episodes = 0;
   std::vector<float> latent;  ///< z to act with: the mean of q(z|c)
+  int broken_episodes = 0;    ///< of those since the entry before: they broke down, and count until
+                              ///< then
 };
 
 /// Adapts to the task of `env` as at PEARL's test time: explores with z drawn from the prior in the

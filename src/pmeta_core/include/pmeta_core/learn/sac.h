@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pmeta_core/env/env.h"
+#include "pmeta_core/learn/broken_episodes.h"
 #include "pmeta_core/learn/gaussian_policy.h"
 #include "pmeta_core/learn/optimizer.h"
 #include "pmeta_core/learn/sac_networks.h"
@@ -56,6 +57,7 @@ class SacLearner {
   /// from the prior in every prior_interval-th, else from q(z|c). On z from the prior `explorer`
   /// acts, if not null: another actor's parameters. Those transitions become context, and with
   /// posterior_episodes all do.
+  /// An episode that breaks down is counted, and another begun; of its last step nothing is kept.
   /// Returns the transitions made. Allocates nothing once the buffers are full.
   std::int64_t collect(const float* parameters, Rng& rng, const float* explorer = nullptr);
 
@@ -75,6 +77,7 @@ class SacLearner {
   const ReplayBuffer& context() const { return context_; }  ///< rewards: Step::evaluatedReward()
   std::int64_t updates() const { return updates_; }         ///< calls of update() so far
   const Env& env() const { return *env_; }
+  std::int64_t brokenEpisodes() const { return broken_.count(); }
 
   /// All but parameters and optimiser: replay, context, targets, temperature, the environment in
   /// mid-episode, counters.
@@ -83,7 +86,7 @@ class SacLearner {
 
  private:
   void beginEpisode(const float* parameters, bool warm_up, Rng& rng);
-  void step(const float* parameters, const float* explorer, bool warm_up, Rng& rng);
+  std::int64_t step(const float* parameters, const float* explorer, bool warm_up, Rng& rng);
   void sampleContext(float* rows, Rng& rng);
   void sampleBatch(Rng& rng);
   void drawTask(std::size_t context, const float* parameters, Rng& rng);
@@ -105,6 +108,7 @@ class SacLearner {
   AlignedFloats targets_;
   std::int64_t updates_ = 0;
   std::int64_t episodes_ = 0;  // after the warm-up
+  BrokenEpisodes broken_;
   bool started_ = false;
   bool prior_episode_ = true;  // this episode's transitions become context
 

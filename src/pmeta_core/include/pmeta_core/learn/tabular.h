@@ -15,6 +15,8 @@ struct ReturnStats {
   double mean = 0;
   double std = 0;    ///< standard deviation over episodes (population)
   int episodes = 0;  ///< episodes, or start states where the average is exact
+  int broken_episodes =
+      0;  ///< whose simulation broke down: they count with their return until then
 };
 
 /// The action of the largest value; the lowest index wins a tie.

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "pmeta_core/base/rng.h"
@@ -21,13 +22,17 @@ class Evaluation {
 
   /// Undiscounted returns of one episode in each environment. They run in step, so that the policy
   /// sees them as one batch; all starts are drawn before the first step and thus depend on `rng`
-  /// only.
+  /// only. An episode that breaks down counts with its return until then.
   ReturnStats run(const BatchPolicy& policy, Rng& rng);
 
-  /// One episode, from the start that the first episode of run() has at the same `rng`.
+  /// One episode, from the start that the first episode of run() has at the same `rng`. Where it
+  /// breaks down it is truncated, without the step that broke it.
   Episode record(const BatchPolicy& policy, Rng& rng);
 
  private:
+  bool reset(std::size_t i, Rng& rng);
+  std::optional<Step> step(std::size_t i, const double* action, Rng& rng);
+
   std::vector<std::unique_ptr<Env>> envs_;
   std::size_t observation_size_;
   std::size_t action_size_;

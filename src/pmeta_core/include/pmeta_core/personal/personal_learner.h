@@ -30,9 +30,10 @@ struct Episode {
 
 /// What one personalised update cost and gave.
 struct UpdateStats {
-  std::int64_t env_steps = 0;  ///< environment transitions
-  std::int64_t updates = 0;    ///< personalised updates
-  double loss = 0;             ///< the learner's own measure; for tables the mean |TD error|
+  std::int64_t env_steps = 0;        ///< environment transitions
+  std::int64_t updates = 0;          ///< personalised updates
+  std::int64_t broken_episodes = 0;  ///< whose simulation broke down
+  double loss = 0;                   ///< the learner's own measure; for tables the mean |TD error|
 };
 
 /// Return of a policy that was given some exploration episodes to find out about the task.

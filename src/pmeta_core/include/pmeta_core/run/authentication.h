@@ -41,6 +41,15 @@ struct RoundNews {
   std::int64_t stamp = 0;  ///< when it was written, in nanoseconds
 };
 
+/// What a message about the state of an agent says that others act on.
+struct AgentNews {
+  std::string run_id;
+  int task = 0;
+  std::uint8_t state = 0;
+  std::string message;
+  std::uint64_t incarnation = 0;  ///< of the aggregator that it follows; 0: of none yet
+};
+
 enum class Authenticity {
   kAuthentic,
   kUnsigned,  ///< no MAC where one is needed
@@ -70,6 +79,7 @@ class Authenticator {
   Mac mac(const MetaPolicy& meta, int rounds) const;
   Mac mac(const MetaPolicy& header, const ModelView& model, int rounds) const;
   Mac mac(const TaskReturn& result, const std::string& task_name) const;
+  Mac mac(const AgentNews& news) const;
   Mac mac(const RoundSummary& summary, const RoundNews& news) const;
 
   /// Compares the MAC that a message carries with the one it should, in constant time.

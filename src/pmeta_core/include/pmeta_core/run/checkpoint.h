@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "pmeta_core/base/error.h"
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/base/state.h"
 #include "pmeta_core/run/experiment.h"
@@ -93,6 +95,24 @@ class CheckpointFolder {
     read(round, [&](StateReader& reader) { component.loadState(reader); });
   }
 
+  /// Loads the newest one, of at most `at_most`, that can be loaded, into what `fresh` gives: a
+  /// component as it is before round 1. Returns its round; 0 if there is none, and then leaves one
+  /// that is fresh. Appends to `refused` as newest() does.
+  template <class Fresh>
+  int loadNewest(int at_most, const Fresh& fresh, std::vector<std::string>& refused) const {
+    for (int round = newest(at_most, refused); round > 0; round = newest(round - 1, refused)) {
+      try {
+        auto&& component = fresh();
+        load(round, component);
+        return round;
+      } catch (const Error& error) {
+        refused.emplace_back(error.what());
+      }
+    }
+    fresh();
+    return 0;
+  }
+
  private:
   void write(int round, const std::function<void(StateWriter&)>& save) const;
   void read(int round, const std::function<void(StateReader&)>& load) const;
@@ -103,9 +123,10 @@ class CheckpointFolder {
   CheckpointIdentity identity_;
 };
 
-/// The newest round of which every one of `folders` has a good checkpoint; 0 if there is none.
-/// Appends a sentence to `refused` for each newer file that is not good.
+/// The newest round, of at most `at_most`, of which every one of `folders` has a good checkpoint; 0
+/// if there is none. Appends a sentence to `refused` for each newer file that is not good.
 int newestCommonRound(const std::vector<CheckpointFolder>& folders,
-                      std::vector<std::string>& refused);
+                      std::vector<std::string>& refused,
+                      int at_most = std::numeric_limits<int>::max());
 
 }  // namespace pmeta

@@ -25,8 +25,9 @@ using OnRound = std::function<bool(const RoundBook::Round&)>;
 
 /// Runs the whole experiment in this process and thread, with the very classes the nodes use and
 /// the same result bit for bit. Files are written if `log` is given: those of RunLog, checkpoints
-/// where settings ask for them, and the last policies below policies/, a stopped run's too; what is
-/// thrown goes into the manifest as well.
+/// where settings ask for them, and the last policies below policies/, a stopped run's too. If it
+/// throws, the manifest says "failed" and why; so it does at the first TaskFailed, whatever the
+/// quorum: nobody is late in one process.
 ///
 /// With `resumed_round`, from findResumePoint(), the run goes on from that round's checkpoints; the
 /// rounds before are then missing from the result. `log` must be that of RunLog::reopen().

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -44,6 +45,13 @@ class MetaAggregator {
   /// Checks an update and keeps it for this round. The update is shared, not copied.
   Answer offer(std::shared_ptr<const AuxiliaryUpdate> update);
 
+  /// A task has failed for good, as TaskFailed says: it sends nothing more. False if that is known.
+  bool giveUp(int task, const std::string& reason);
+
+  /// Why the run cannot go on: the sentence of the first task that failed. "" while it can: nobody
+  /// has failed, or tasks enough for a quorum of fewer than all are left.
+  std::string hopeless() const;
+
   /// The meta-policy after the rounds closed so far.
   const MetaPolicy& metaPolicy() const { return meta_; }
 
@@ -86,6 +94,7 @@ class MetaAggregator {
   std::vector<double> norms_;  ///< of the updates, by task, where bound_ asks for them
   std::vector<Exclusion> exclusions_;
   std::vector<Counts> counts_;
+  std::map<int, std::string> failures_;  ///< by task; a test task may be among them
   std::int64_t refused_unknown_ = 0;
 };
 

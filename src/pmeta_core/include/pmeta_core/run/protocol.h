@@ -19,6 +19,7 @@ struct MetaPolicy {
   bool evaluate = false;  ///< somebody wants this and the personal policies after it evaluated
   std::uint64_t incarnation = 0;  ///< of the aggregator; one started again may go back to a round
   bool checkpoint = false;        ///< all are to save one after the round that begins with this
+  std::string settings_hash;      ///< Experiment::settingsHash() of the aggregator
 };
 
 /// What an agent sends at the end of its round: auxiliary (or, when averaging, personal)
@@ -29,6 +30,7 @@ struct AuxiliaryUpdate {
   int round = 0;  ///< the round that was trained: one more than the meta-policy it began with
   Model model;
   double weight = 1;
+  std::string settings_hash;  ///< Experiment::settingsHash() of the agent
 };
 
 enum class Policy { kPersonal, kMeta };
@@ -51,7 +53,9 @@ struct TaskReturn {
   int episodes = 0;
   std::int64_t env_steps = 0;  ///< training transitions of this round; 0 for the meta-policy
   std::int64_t updates = 0;    ///< personalised updates of this round; 0 for the meta-policy
-  double seconds = 0;          ///< wall time of this round's training and evaluation
+  /// Episodes whose simulation broke down: of the evaluation, and of training since the last.
+  std::int64_t broken_episodes = 0;
+  double seconds = 0;  ///< wall time of this round's training and evaluation
 
   /// All but run_id, which whoever loads it knows.
   void saveState(StateWriter& writer) const;
@@ -71,10 +75,15 @@ struct RoundSummary {
   std::vector<int> excluded;  ///< tasks whose update came but was left out of the aggregation
   double seconds = 0;         ///< from the meta-policy's publication to the aggregation
   double eta_seconds = 0;     ///< estimate until the last round
+  std::int64_t broken_episodes = 0;  ///< of all rounds so far
 
   /// What is known when the round closes: round, participants, missing, excluded and seconds.
   void saveState(StateWriter& writer) const;
   void loadState(StateReader& reader);
 };
+
+/// Says that `who` has other settings than this party: a sentence.
+std::string otherSettings(const std::string& who, const std::string& theirs,
+                          const std::string& ours);
 
 }  // namespace pmeta

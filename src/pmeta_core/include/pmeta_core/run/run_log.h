@@ -33,6 +33,8 @@ class RoundBook {
   explicit RoundBook(const Experiment& experiment);
 
   /// False if the return is a duplicate, of a round given out already, or of no task of this run.
+  /// Throws Error if one that is due is no result: a number that is not finite, no episode, or
+  /// counters that no run reaches.
   bool add(const TaskReturn& result);
 
   /// Round `round` has been aggregated: personal returns of its participants and of the excluded,
@@ -45,6 +47,8 @@ class RoundBook {
   std::vector<Round> take(bool force = false);
 
   int roundsTaken() const { return next_ - 1; }
+  /// Of those rounds, the episodes that broke down.
+  std::int64_t brokenEpisodes() const { return broken_episodes_; }
 
   /// Rounds that are open, with the returns in hand, and the counters of those given out.
   void saveState(StateWriter& writer) const;
@@ -65,6 +69,7 @@ class RoundBook {
     bool reported(int task) const;
     bool hasMeta(int task, const std::vector<int>& contexts) const;
   };
+  void requireResult(const TaskReturn& result) const;
   bool isComplete(int round, const Open& open) const;
 
   int num_tasks_;    ///< training tasks
@@ -78,6 +83,7 @@ class RoundBook {
   int next_ = 1;
   std::vector<std::int64_t> env_steps_;
   std::vector<std::int64_t> updates_;
+  std::int64_t broken_episodes_ = 0;
   double seconds_ = 0;
 };
 
@@ -130,6 +136,7 @@ class RunLog {
   std::string manifest_;  // what does not change of it, as JSON
   int rounds_done_ = 0;
   Clock::time_point next_manifest_;  // while the run goes on
+  std::int64_t broken_episodes_ = 0;
   std::ofstream csv_;
   std::uintmax_t csv_size_ = 0;  // of whole rounds
 };

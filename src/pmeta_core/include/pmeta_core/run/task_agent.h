@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "pmeta_core/run/divergence.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/protocol.h"
 
@@ -22,6 +23,7 @@ class TaskAgent {
     std::int64_t env_steps = 0;          ///< of this round
     std::int64_t updates = 0;            ///< of this round
     double loss = 0;                     ///< of the last update
+    std::int64_t broken_episodes = 0;    ///< of this round's training
     double distance = 0;                 ///< ||phi - omega_meta|| over the task's own entries
 
     /// All but the update, which follows from the agent's state.
@@ -40,7 +42,8 @@ class TaskAgent {
 
   /// One round from `meta`: reset, R updates, and evaluation of the personal policy where
   /// Experiment::evaluationSchedule() has it, or `meta` asks for it. Nothing if stopped. Throws
-  /// Error if the meta-policy does not fit.
+  /// Error if the meta-policy does not fit, and TaskFailed if ten episodes running broke down, or
+  /// anything of the result is not finite: nothing of it may be sent.
   ///
   /// An evaluation outside the schedule changes nothing that training or scheduled ones see.
   ///
@@ -50,7 +53,8 @@ class TaskAgent {
   std::optional<RoundResult> trainRound(const MetaPolicy& meta, const KeepGoing& keep_going = {});
 
   /// The meta-policy on this task: one return for each of Experiment::contextEpisodes(), or none
-  /// in a round that does not evaluate and where `meta` does not ask for it.
+  /// in a round that does not evaluate and where `meta` does not ask for it. Throws as trainRound()
+  /// does.
   std::vector<TaskReturn> evaluateMeta(const MetaPolicy& meta);
 
   /// A policy on this task, on at least `episodes` episodes that no round evaluates; a meta-policy
@@ -60,6 +64,9 @@ class TaskAgent {
   const Model& personal() const { return learner_->personal(); }
   /// What tells the personal policy its task beside the observations; empty if nothing does.
   std::vector<float> taskInput() const { return learner_->taskInput(learner_->personal()); }
+
+  /// Episodes that broke down so far, in training and in the evaluations of rounds.
+  std::int64_t brokenEpisodes() const { return broken_episodes_; }
 
   /// The round trained last; 0 before the first.
   int round() const { return round_; }
@@ -77,12 +84,21 @@ class TaskAgent {
   Episode recordMeta(const MetaPolicy& meta) const;
 
  private:
+  bool train(int round, const KeepGoing& keep_going, RoundResult& result);
   RoundResult lastResult() const;
+  const Model& sent() const;
   void adjustWeight(double personal_return);
   Rng evaluationRng() const;
-  TaskReturn makeReturn(int round, Policy policy, const ReturnStats& stats) const;
+  TaskReturn makeReturn(int round, Policy policy, const ReturnStats& stats);
+  template <class Work>
+  auto guarded(int round, const Work& work) const;
+  [[noreturn]] void fail(int round, const std::string& what, const std::string& advice) const;
 
   std::string run_id_;
+  std::string settings_hash_;
+  std::string name_;                 // for people
+  std::string step_sizes_;           // what to change where it diverges
+  std::string simulation_settings_;  // and where its simulation breaks down
   std::uint64_t seed_;
   int task_;
   Split split_;
@@ -95,6 +111,8 @@ class TaskAgent {
   bool between_ = true;         // no round has been left in its middle
   std::int64_t env_steps_ = 0;  // since the last evaluation
   std::int64_t updates_ = 0;
+  std::int64_t unreported_broken_ = 0;  // training episodes that broke down, likewise
+  std::int64_t broken_episodes_ = 0;    // in all
   double catch_up_;
   double log_weight_ = 0;              // of this task's updates in the mean
   std::optional<double> meta_return_;  // the newest scheduled one on this task

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+
+#include "pmeta_core/base/state.h"
+#include "pmeta_core/env/env.h"
+
+namespace pmeta {
+
+/// Counts the training episodes whose simulation broke down, and gives up where one after the other
+/// does.
+class BrokenEpisodes {
+ public:
+  static constexpr int kMostRunning = 10;
+
+  /// An episode has come to its end.
+  void ended() { running_ = 0; }
+
+  /// An episode has broken down. Throws BrokenEpisode if it is the tenth running.
+  void broke(const BrokenEpisode& episode);
+
+  std::int64_t count() const { return count_; }  ///< in all
+
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
+
+ private:
+  int running_ = 0;  // since the last that came to its end
+  std::int64_t count_ = 0;
+};
+
+}  // namespace pmeta
