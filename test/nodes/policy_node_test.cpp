@@ -143,7 +143,7 @@ TEST_F(PolicyNodeTest, SaysInOneSentenceWhatIsWrong) {
   EXPECT_EQ(text.find("policy_node: acts with a trained policy from a file."), 0u) << text;
   EXPECT_NE(text.find("which policy? Give the private parameter policy, e.g."), std::string::npos)
       << text;
-  EXPECT_NE(text.find("cannot read the policy file /none (No such file or directory)."),
+  EXPECT_NE(text.find("the policy file /none cannot be read (No such file or directory)."),
             std::string::npos)
       << text;
   EXPECT_NE(text.find("the private parameter task is 'abc' but must be a whole number from 0 to"),

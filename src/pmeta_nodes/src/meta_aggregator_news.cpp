@@ -9,6 +9,7 @@
 #include "meta_aggregator_node.h"
 #include "onlookers.h"
 #include "pmeta_core/base/error.h"
+#include "private_param.h"
 
 namespace pmeta_nodes {
 namespace {
@@ -105,9 +106,8 @@ void MetaAggregatorNode::announcePause() {
 }
 
 void MetaAggregatorNode::awaitOnlookers() {
-  ros::NodeHandle own("~");
-  const Onlookers onlookers(own.param("await_viewer", false), own.param("await_recorder", false),
-                            experiment_.totalTasks());
+  const Onlookers onlookers(privateFlag("await_viewer", false),
+                            privateFlag("await_recorder", false), experiment_.totalTasks());
   const Clock::time_point limit = Clock::now() + kOnlookersWithin;
   const std::string round = "round " + std::to_string(roundInHand());
   std::string missing;

@@ -2,7 +2,6 @@
 
 #include <ros/master.h>
 
-#include <atomic>
 #include <csignal>
 #include <cstring>
 #include <iostream>
@@ -11,17 +10,15 @@
 #include "free_memory.h"
 #include "master_watch.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/process.h"
 #include "private_param.h"
 
 namespace pmeta_nodes {
 namespace {
 
-std::atomic<bool> g_stop{false};
 std::unique_ptr<MasterWatch> g_master;
 
 constexpr double kAskAgain = 0.2;  // seconds between two attempts at the master
-
-void onSignal(int) { g_stop = true; }
 
 }  // namespace
 
@@ -37,6 +34,7 @@ void initNode(int argc, char** argv, const std::string& name, std::uint32_t opti
 
 int runNode(int argc, char** argv, const std::string& name, const std::string& help,
             const std::function<int(const pmeta::Experiment&)>& body) {
+  pmeta::prepareProcess();
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
       std::cout << help;
@@ -48,8 +46,7 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
   // outside the try: the console falls silent when the last node handle goes
   const ros::NodeHandle nh;
   // our own handlers: the last words of a run are published before ROS goes down
-  std::signal(SIGINT, onSignal);
-  std::signal(SIGTERM, onSignal);
+  pmeta::heedStopSignals();
   try {
     const pmeta::Experiment experiment = readExperiment(nh);
     g_master = std::make_unique<MasterWatch>();
@@ -70,7 +67,9 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
   }
 }
 
-bool stopRequested() { return g_stop || !ros::ok() || (g_master && !g_master->trouble().empty()); }
+bool stopRequested() {
+  return pmeta::stopSignalled() || !ros::ok() || (g_master && !g_master->trouble().empty());
+}
 
 pmeta::Experiment readExperiment(const ros::NodeHandle& nh) {
   const std::string file = privateText("config_file", "");

@@ -4,6 +4,7 @@
 
 #include "node_main.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/process.h"
 #include "policy_node.h"
 #include "private_param.h"
 
@@ -41,6 +42,7 @@ void act() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  pmeta::prepareProcess();
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
       std::cout << kHelp;

@@ -18,6 +18,7 @@
 #include "live_nodes.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
+#include "pmeta_core/base/process.h"
 #include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/experiment.h"
 #include "pmeta_core/run/run_log.h"
@@ -226,6 +227,8 @@ Experiment checkedExperiment(const std::string& config, std::vector<std::string>
     }
   } else {
     pmeta::requireResumable(experiment.runDir());
+    const std::string other_machine = pmeta::otherMachine(experiment);
+    if (!other_machine.empty()) std::cerr << "pmeta: warning: " << other_machine << "\n";
   }
   return experiment;
 }
@@ -274,6 +277,7 @@ int answer(std::vector<std::string> words) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  pmeta::prepareProcess();
   const std::vector<std::string> words(argv + 1, argv + argc);
   if (words.empty() || words.front() == "--help" || words.front() == "-h") {
     std::cout << kHelp;

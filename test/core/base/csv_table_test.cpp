@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "../support.h"
 
 namespace pmeta {
@@ -49,6 +51,28 @@ TEST(CsvTable, RefusesWhatIsNoTable) {
             "a.csv line 2 has 3 cells for 2 columns: it goes on after column 'b'.");
   EXPECT_EQ(refusal("a,b\n\n1,2\n"),
             "a.csv line 2 has 1 cells for 2 columns: it ends before column 'b'.");
+}
+
+TEST(CsvTable, AWideHeaderIsReadAsFastAsALongOne) {
+  std::string header = "c0";
+  for (int k = 1; k < 200000; ++k) header += ",c" + std::to_string(k);
+  EXPECT_EQ(CsvTable::parse(header + "\n", "a.csv").column("c199999"), 199999u);
+  EXPECT_EQ(refusal(header + ",c7\n"), "a.csv line 1 names the column 'c7' twice.");
+}
+
+TEST(CsvTable, AColumnsNameIsShownWithoutControlCharacters) {
+  EXPECT_EQ(refusal("a,b\x1b[31m\n1\n"),
+            "a.csv line 2 has 1 cells for 2 columns: it ends before column 'b?[31m'.");
+}
+
+TEST(CsvTable, WhatUnpacksToTooMuchIsRefusedByName) {
+  const TempDir dir;
+  const std::string path = dir / "bomb.csv.gz";
+  const std::string pack = "head -c 70000000 /dev/zero | gzip -1 > " + path;
+  ASSERT_EQ(std::system(pack.c_str()), 0);
+  EXPECT_EQ(errorOf([&] { CsvTable::load(path); }),
+            "cannot read " + path +
+                " (it has more than 67108864 bytes when unpacked, and at most that is read).");
 }
 
 TEST(CsvTable, RefusesCellsThatAreNoNumbersOfTheirRange) {
@@ -100,9 +124,10 @@ TEST(CsvTable, SaysWhyAFileCannotBeRead) {
     return errorOf([&] { CsvTable::load(dir / name); });
   };
   EXPECT_EQ(loading("none.csv"),
-            "cannot read " + dir.path() + "/none.csv (No such file or directory).");
+            "the table " + dir.path() + "/none.csv cannot be read (No such file or directory).");
   std::filesystem::create_directory(dir / "folder");
-  EXPECT_EQ(loading("folder"), "cannot read " + dir.path() + "/folder (Is a directory).");
+  EXPECT_EQ(loading("folder"),
+            "the table " + dir.path() + "/folder cannot be read (it is a folder).");
   writeFile(dir / "empty.csv", "");
   EXPECT_EQ(loading("empty.csv"),
             dir.path() + "/empty.csv is empty: its first line must name the columns.");

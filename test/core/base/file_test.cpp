@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <fstream>
 
@@ -37,6 +38,19 @@ TEST(File, AFifoIsRefusedAtOnce) {
   EXPECT_THROW(requireRegularFile("/dev/null", "the file"), Error);
 }
 
+TEST(File, OnlyOnesOwnDescriptorsMayBePipes) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  ASSERT_EQ(write(ends[1], "a: 1\n", 5), 5);
+  close(ends[1]);
+  const std::string name = "/dev/fd/" + std::to_string(ends[0]);
+  EXPECT_EQ(errorOf(name),
+            "the settings file " + name + " cannot be read (it is not a regular file).");
+  EXPECT_EQ(readFileOrPipe(name, "the settings file"), "a: 1\n");
+  close(ends[0]);
+  EXPECT_THROW(readFileOrPipe("/dev/zero", "the settings file"), Error);
+}
+
 TEST(File, WhyItCannotBeReadIsSaid) {
   const test::TempDir dir;
   EXPECT_EQ(errorOf(dir / "none"),
@@ -44,8 +58,9 @@ TEST(File, WhyItCannotBeReadIsSaid) {
   EXPECT_EQ(errorOf(dir.path()),
             "the settings file " + dir.path() + " cannot be read (it is a folder).");
   std::ofstream(dir / "long") << "12345";
-  EXPECT_EQ(errorOf(dir / "long", 4), "the settings file " + dir / "long" +
-                                          " cannot be read (it has 5 bytes, and at most 4 are read).");
+  EXPECT_EQ(errorOf(dir / "long", 4),
+            "the settings file " + dir / "long" +
+                " cannot be read (it has 5 bytes, and at most 4 are read).");
 }
 
 }  // namespace

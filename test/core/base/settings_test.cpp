@@ -244,10 +244,11 @@ TEST(Settings, AListThatHoldsItselfIsRefused) {
 
 TEST(Settings, FilesAreNamedInErrors) {
   const TempDir dir;
-  EXPECT_EQ(errorOf([&] { loadYamlFile(dir / "none.yaml"); }),
-            "cannot read the settings file " + (dir / "none.yaml") + ".");
+  EXPECT_EQ(
+      errorOf([&] { loadYamlFile(dir / "none.yaml"); }),
+      "the settings file " + (dir / "none.yaml") + " cannot be read (No such file or directory).");
   EXPECT_EQ(errorOf([&] { loadYamlFile(dir.path()); }),
-            "cannot read the settings file " + dir.path() + ".");
+            "the settings file " + dir.path() + " cannot be read (it is a folder).");
   writeFile(dir / "list.yaml", "- 1\n");
   EXPECT_EQ(errorOf([&] { loadYamlFile(dir / "list.yaml"); }),
             (dir / "list.yaml") + " must hold settings as 'key: value' lines.");

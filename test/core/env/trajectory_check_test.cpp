@@ -187,7 +187,7 @@ TEST(TrajectoryCheck, OtherKindsAndFilesAreRefused) {
       errorOf([] { checkTrajectories("cartpole", kMountainCar); }),
       std::string(kMountainCar) + " line 1 names no column 'x': is this the right kind of file?");
   EXPECT_EQ(errorOf([] { checkTrajectories("cartpole", "/nowhere/a.csv"); }),
-            "cannot read /nowhere/a.csv (No such file or directory).");
+            "the table /nowhere/a.csv cannot be read (No such file or directory).");
   const TempDir dir;
   const std::string whole = readFile(kCartPole);
   writeFile(dir / "cut.csv.gz", whole.substr(0, whole.size() / 2));

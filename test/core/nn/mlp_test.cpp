@@ -318,5 +318,25 @@ TEST(Mlp, RefusesWhatItCannotDo) {
             "the network 'q' has 4 inputs, none at 4.");
 }
 
+TEST(Mlp, APortableOneMultipliesByEigenAlone) {
+  // one layer without biases is one product
+  const Mlp mlp({"q", 30, {}, 50, false, true});
+  std::vector<float> parameters = initialised(mlp, 1);
+  std::fill(parameters.begin() + 30 * 50, parameters.end(), 0.0f);
+  const std::vector<float> input = noise(16 * 30, 2), d_output = noise(16 * 50, 3);
+  std::vector<float> product(16 * 50), gradient(mlp.size()), d_weight(50 * 30);
+  MlpWorkspace workspace(mlp, 16);
+  const float* found = mlp.forward(parameters.data(), input.data(), 16, workspace);
+  gemmEigen(Transpose::kNo, Transpose::kYes, 16, 50, 30, 1, input.data(), 30, parameters.data(), 30,
+            0, product.data(), 50);
+  EXPECT_EQ(std::vector<float>(found, found + product.size()), product);
+  mlp.backward(parameters.data(), input.data(), 16, d_output.data(), gradient.data(), nullptr,
+               workspace);
+  gemmEigen(Transpose::kYes, Transpose::kNo, 50, 30, 16, 1, d_output.data(), 50, input.data(), 30,
+            0, d_weight.data(), 30);
+  gradient.resize(d_weight.size());
+  EXPECT_EQ(gradient, d_weight);
+}
+
 }  // namespace
 }  // namespace pmeta

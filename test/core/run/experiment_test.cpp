@@ -276,8 +276,9 @@ TEST(Experiment, LoadReadsAFile) {
   EXPECT_EQ(e.settings().seed, 3);
   EXPECT_EQ(e.settings().rounds, 2);
   EXPECT_EQ(e.numTasks(), 1);
-  EXPECT_EQ(errorOf([&] { Experiment::load(dir / "none.yaml"); }),
-            "cannot read the settings file " + (dir / "none.yaml") + ".");
+  EXPECT_EQ(
+      errorOf([&] { Experiment::load(dir / "none.yaml"); }),
+      "the settings file " + (dir / "none.yaml") + " cannot be read (No such file or directory).");
 }
 
 TEST(Experiment, TheRepositorysConfigsAreValid) {

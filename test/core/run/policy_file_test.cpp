@@ -243,9 +243,9 @@ TEST_F(PolicyFileTest, AMaskHoldsZeroesAndOnes) {
 
 TEST_F(PolicyFileTest, MissingFilesAndFoldersAreNamed) {
   EXPECT_EQ(errorOf([&] { loadPolicy(dir_ / "none"); }),
-            "cannot read the policy file " + (dir_ / "none") + " (No such file or directory).");
-  EXPECT_THAT(errorOf([&] { loadPolicy(dir_.path()); }), HasSubstr("cannot read the policy file"));
-  EXPECT_THAT(errorOf([&] { loadPolicy("/dev/zero"); }), HasSubstr("cannot read the policy file"));
+            "the policy file " + (dir_ / "none") + " cannot be read (No such file or directory).");
+  EXPECT_THAT(errorOf([&] { loadPolicy(dir_.path()); }), HasSubstr("cannot be read"));
+  EXPECT_THAT(errorOf([&] { loadPolicy("/dev/zero"); }), HasSubstr("cannot be read"));
   EXPECT_THAT(errorOf([&] { savePolicy(dir_ / "none/a", floatModel(), {}); }),
               HasSubstr("cannot write"));
 }

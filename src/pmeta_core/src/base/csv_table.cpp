@@ -5,23 +5,29 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <iterator>
 #include <limits>
 #include <memory>
+#include <unordered_set>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/file.h"
 #include "pmeta_core/base/format.h"
+#include "pmeta_core/base/number.h"
 
 namespace pmeta {
 namespace {
+
+// a few cells of one character each take thirty times as much
+constexpr std::size_t kLargestTable = std::size_t{1} << 26;
 
 // zlib also reads plain files
 std::string readWhole(const std::string& path) {
   const auto fail = [&](const std::string& why) -> std::string {
     throw Error("cannot read " + path + " (" + why + ").");
   };
+  requireRegularFile(path, "the table");
   errno = 0;
   const gzFile opened = gzopen(path.c_str(), "rb");
   if (opened == nullptr) return fail(errno == 0 ? "out of memory" : std::strerror(errno));
@@ -31,6 +37,10 @@ std::string readWhole(const std::string& path) {
   int got = 0;
   while ((got = gzread(file.get(), buffer.data(), static_cast<unsigned>(buffer.size()))) > 0) {
     text.append(buffer.data(), got);
+    if (text.size() > kLargestTable) {
+      return fail("it has more than " + std::to_string(kLargestTable) +
+                  " bytes when unpacked, and at most that is read");
+    }
   }
   int code = Z_OK;
   const std::string why = gzerror(file.get(), &code);
@@ -54,14 +64,6 @@ std::vector<std::string> splitLine(const std::string& line) {
 
 std::string place(const std::string& source, long line) {
   return source + " line " + std::to_string(line);
-}
-
-// strtod over the whole cell, without the words and hexadecimal numbers that it also takes
-bool parseNumber(const std::string& text, double& value) {
-  if (text.empty() || text.find_first_not_of("0123456789+-.eE") != std::string::npos) return false;
-  char* end = nullptr;
-  value = std::strtod(text.c_str(), &end);
-  return end == text.c_str() + text.size() && std::isfinite(value);
 }
 
 std::string rangeSuffix(const Range& range) {
@@ -90,10 +92,11 @@ CsvTable CsvTable::parse(const std::string& text, const std::string& source) {
 
 void CsvTable::addRow(std::vector<std::string> cells, long line) {
   if (line == 1) {
-    for (auto name = cells.begin(); name != cells.end(); ++name) {
-      if (name->empty()) throw Error(place(source_, line) + " has a column without a name.");
-      if (std::find(cells.begin(), name, *name) != name) {
-        throw Error(place(source_, line) + " names the column " + shown(*name) + " twice.");
+    std::unordered_set<std::string> names;
+    for (const std::string& name : cells) {
+      if (name.empty()) throw Error(place(source_, line) + " has a column without a name.");
+      if (!names.insert(name).second) {
+        throw Error(place(source_, line) + " names the column " + shown(name) + " twice.");
       }
     }
     columns_ = std::move(cells);
@@ -104,10 +107,9 @@ void CsvTable::addRow(std::vector<std::string> cells, long line) {
     const std::size_t column = std::min(cells.size(), columns_.size() - 1);
     throw Error(place(source_, line) + " has " + std::to_string(cells.size()) + " cells for " +
                 std::to_string(columns_.size()) + " columns" +
-                (cells.size() < columns_.size() ? ": it ends before column '"
-                                                : ": it goes on after "
-                                                  "column '") +
-                columns_[column] + "'.");
+                (cells.size() < columns_.size() ? ": it ends before column "
+                                                : ": it goes on after column ") +
+                shown(columns_[column]) + ".");
   }
   cells_.insert(cells_.end(), std::make_move_iterator(cells.begin()),
                 std::make_move_iterator(cells.end()));

@@ -13,22 +13,22 @@ namespace pmeta {
 namespace {
 
 /// An open regular file. O_NONBLOCK, since opening a FIFO waits for a writer otherwise.
-class RegularFile {
+class OpenFile {
  public:
-  RegularFile(const std::string& path, const std::string& what)
+  OpenFile(const std::string& path, const std::string& what, bool any_kind = false)
       : name_(what + " " + path),
-        descriptor_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {
+        descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | (any_kind ? 0 : O_NONBLOCK))) {
     struct stat status {};
     if (descriptor_ < 0 || ::fstat(descriptor_, &status) != 0) refuse(std::strerror(errno));
     if (S_ISDIR(status.st_mode)) refuse("it is a folder");
-    if (!S_ISREG(status.st_mode)) refuse("it is not a regular file");
+    if (!any_kind && !S_ISREG(status.st_mode)) refuse("it is not a regular file");
     size_ = static_cast<std::size_t>(status.st_size);
   }
-  ~RegularFile() {
+  ~OpenFile() {
     if (descriptor_ >= 0) ::close(descriptor_);
   }
-  RegularFile(const RegularFile&) = delete;
-  RegularFile& operator=(const RegularFile&) = delete;
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
 
   std::string read(std::size_t most) const {
     if (size_ > most) {
@@ -44,7 +44,9 @@ class RegularFile {
       if (got < 0) fail(std::strerror(errno));
       if (got == 0) return text;
       text.append(buffer, static_cast<std::size_t>(got));
-      if (text.size() > most) fail("it grows while it is read");
+      if (text.size() > most) {
+        fail("more than " + std::to_string(most) + " bytes come, and at most that is read");
+      }
     }
   }
 
@@ -66,12 +68,15 @@ class RegularFile {
 
 }  // namespace
 
-void requireRegularFile(const std::string& path, const std::string& what) {
-  RegularFile(path, what);
-}
+void requireRegularFile(const std::string& path, const std::string& what) { OpenFile(path, what); }
 
 std::string readFile(const std::string& path, const std::string& what, std::size_t most) {
-  return RegularFile(path, what).read(most);
+  return OpenFile(path, what).read(most);
+}
+
+std::string readFileOrPipe(const std::string& path, const std::string& what, std::size_t most) {
+  const bool own = path.rfind("/dev/fd/", 0) == 0 || path == "/dev/stdin";
+  return OpenFile(path, what, own).read(most);
 }
 
 }  // namespace pmeta

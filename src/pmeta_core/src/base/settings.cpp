@@ -6,12 +6,13 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <set>
 #include <sstream>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/file.h"
 #include "pmeta_core/base/format.h"
+#include "pmeta_core/base/number.h"
 
 namespace pmeta {
 namespace {
@@ -48,14 +49,9 @@ std::string textOf(const YAML::Node& node) {
   return text.empty() ? "null" : text;
 }
 
-// strtod over the whole scalar: yaml-cpp's own conversion also takes words such as ".nan"
+// yaml-cpp's own conversion also takes words such as ".nan"
 bool parseNumber(const YAML::Node& node, double& value) {
-  if (!node.IsScalar() || node.Scalar().empty()) return false;
-  const std::string& text = node.Scalar();
-  char* end = nullptr;
-  value = std::strtod(text.c_str(), &end);
-  return end == text.c_str() + text.size() && std::isfinite(value) &&
-         text.find_first_of("xXpPnN \t\r\n\v\f") == std::string::npos;
+  return node.IsScalar() && pmeta::parseNumber(node.Scalar(), value);
 }
 
 bool parseInteger(const YAML::Node& node, std::int64_t& value) {
@@ -405,6 +401,7 @@ void Settings::refuseUnknown(const std::string& name, const std::string& where) 
 }
 
 std::string formatNumber(double value) {
+  const NumbersWithDots dots;
   char text[40];
   for (int digits = 6; digits <= 17; ++digits) {
     std::snprintf(text, sizeof text, "%.*g", digits, value);
@@ -431,13 +428,7 @@ YAML::Node parseYaml(const std::string& text, const std::string& source) {
 }
 
 YAML::Node loadYamlFile(const std::string& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  const bool empty = file.peek() == std::ifstream::traits_type::eof();
-  if (!file || !(empty || text << file.rdbuf())) {
-    throw Error("cannot read the settings file " + path + ".");
-  }
-  return parseYaml(text.str(), path);
+  return parseYaml(readFileOrPipe(path, "the settings file"), path);
 }
 
 std::map<std::string, std::string> flatSettings(const YAML::Node& map) {

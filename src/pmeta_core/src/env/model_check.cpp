@@ -11,6 +11,7 @@
 
 #include "pmeta_core/base/csv_table.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/number.h"
 #include "pmeta_core/env/ant.h"
 #include "pmeta_core/env/half_cheetah.h"
 #include "pmeta_core/env/walker2d.h"
@@ -175,6 +176,7 @@ std::string modelTable(const ModelReport& report) {
   std::string text = report.path + ": " + std::to_string(report.figures) + " figures in " +
                      std::to_string(report.arrays.size()) + " arrays\nlargest relative error\n";
   std::size_t exact = 0;
+  const NumbersWithDots dots;
   char line[160];
   for (const ModelArrayErrors& one : report.arrays) {
     if (one.largest == 0) {

@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/file.h"
 #include "pmeta_core/base/settings.h"
 
 namespace pmeta {
@@ -85,6 +86,7 @@ MujocoModel MujocoModel::parse(const std::string& xml, const std::string& source
 }
 
 MujocoModel MujocoModel::load(const std::string& path) {
+  requireRegularFile(path, "the model file");
   installHandlers();
   char complaint[kErrorSize] = "";
   mjModel* model = mj_loadXML(path.c_str(), nullptr, complaint, kErrorSize);

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/number.h"
 #include "pmeta_core/env/task_split.h"
 
 namespace pmeta {
@@ -97,6 +98,7 @@ std::string SparsePointFamily::taskName(int task) const {
 
 std::string SparsePointFamily::taskDescription(int task) const {
   const Task& t = tasks_.at(task);
+  const NumbersWithDots dots;
   char text[80];
   std::snprintf(text, sizeof text, "goal at (%.3f, %.3f), angle %.4g rad", t.goal.goal_x,
                 t.goal.goal_y, t.angle);

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/number.h"
 #include "pmeta_core/env/walker2d.h"
 
 namespace pmeta {
@@ -64,6 +65,7 @@ std::string describeWalker2dModel(const MujocoModel& model, const MujocoModel& b
     const int foot = std::max(0, m->body_geomadr[mj_name2id(m, mjOBJ_BODY, body)]);
     return std::max(m->geom_friction[0], m->geom_friction[3 * foot]);
   };
+  const NumbersWithDots dots;
   char text[120];
   std::snprintf(text, sizeof text, "%.3g kg (base %.3g), friction of the feet %.2g and %.2g",
                 totalMass(m), totalMass(base.get()), friction("foot"), friction("foot_left"));

@@ -22,6 +22,7 @@ MlpSpec encoderNetwork(std::size_t inputs, const ContextSettings& settings) {
   spec.inputs = inputs;
   spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
   spec.outputs = 2 * static_cast<std::size_t>(settings.latent_size);
+  spec.portable = settings.portable;
   return spec;
 }
 

@@ -26,6 +26,7 @@ MlpSpec dqnNetwork(const EnvSpec& env, const DqnSettings& settings) {
   spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
   spec.outputs = static_cast<std::size_t>(env.num_actions);
   spec.dueling = settings.dueling;
+  spec.portable = settings.portable;
   return spec;
 }
 

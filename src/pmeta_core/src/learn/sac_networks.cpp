@@ -33,6 +33,7 @@ MlpSpec network(const char* prefix, const SacSettings& settings, std::size_t inp
   spec.inputs = inputs;
   spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
   spec.outputs = outputs;
+  spec.portable = settings.portable;
   return spec;
 }
 

@@ -11,9 +11,6 @@
 #error "pMeta holds oneDNN to one thread through OpenMP; this oneDNN is built for another runtime."
 #endif
 
-#define PMETA_TEXT_OF(x) #x
-#define PMETA_TEXT(x) PMETA_TEXT_OF(x)
-
 namespace pmeta {
 namespace {
 
@@ -52,9 +49,20 @@ void gemm(Transpose transpose_a, Transpose transpose_b, std::size_t m, std::size
   }
 }
 
-const char* gemmName() {
-  return "oneDNN " PMETA_TEXT(DNNL_VERSION_MAJOR) "." PMETA_TEXT(DNNL_VERSION_MINOR) "." PMETA_TEXT(
-      DNNL_VERSION_PATCH);
+std::string gemmName() {
+  const dnnl_version_t* version = dnnl_version();
+  std::string name = "oneDNN " + std::to_string(version->major) + "." +
+                     std::to_string(version->minor) + "." + std::to_string(version->patch);
+#if DNNL_VERSION_MAJOR >= 2
+  // each holds the bits of those that it extends
+  const auto isa = static_cast<unsigned>(dnnl_get_effective_cpu_isa());
+  const auto has = [isa](dnnl_cpu_isa_t set) { return (isa & set) == static_cast<unsigned>(set); };
+  name += has(dnnl_cpu_isa_avx512_core) ? " (AVX-512)"
+          : has(dnnl_cpu_isa_avx2)      ? " (AVX2)"
+          : has(dnnl_cpu_isa_avx)       ? " (AVX)"
+                                        : " (SSE4.1)";
+#endif
+  return name;
 }
 
 }  // namespace pmeta

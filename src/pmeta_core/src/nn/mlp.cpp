@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/nn/gemm.h"
 #include "pmeta_core/nn/kernels.h"
 
 namespace pmeta {
@@ -49,7 +48,7 @@ MlpWorkspace::MlpWorkspace(const Mlp& mlp, std::size_t max_batch) : max_batch_(m
   next_delta_.resize(max_batch * widest);
 }
 
-Mlp::Mlp(MlpSpec spec) : spec_(std::move(spec)) {
+Mlp::Mlp(MlpSpec spec) : spec_(std::move(spec)), product_(spec_.portable ? &gemmEigen : &gemm) {
   const auto zero = std::find(spec_.hidden.begin(), spec_.hidden.end(), std::size_t{0});
   if (spec_.inputs == 0 || spec_.outputs == 0 || zero != spec_.hidden.end()) {
     throw Error("the network '" + spec_.prefix +
@@ -110,8 +109,8 @@ const float* Mlp::forward(const float* parameters, const float* input, std::size
     if (batch <= kFewRows || layer.outputs <= kFewOutputs) {
       kernel.affine(x, weight, bias, y, batch, layer.inputs, layer.outputs, relu);
     } else {
-      gemm(Transpose::kNo, Transpose::kYes, batch, layer.outputs, layer.inputs, 1, x, layer.inputs,
-           weight, layer.inputs, 0, y, layer.outputs);
+      product_(Transpose::kNo, Transpose::kYes, batch, layer.outputs, layer.inputs, 1, x,
+               layer.inputs, weight, layer.inputs, 0, y, layer.outputs);
       (relu ? kernel.addBiasRelu : kernel.addBias)(y, bias, batch, layer.outputs);
     }
     x = y;
@@ -166,18 +165,19 @@ void Mlp::backwardThrough(const float* parameters, const float* input, std::size
     const std::size_t in = layer.inputs, out = layer.outputs;
     if (gradient != nullptr) {
       const float* x = l == 0 ? input : workspace.activations_[l - 1].data();
-      gemm(Transpose::kYes, Transpose::kNo, out, in, batch, 1, delta, out, x, in, 0,
-           gradient + layer.weight, in);
+      product_(Transpose::kYes, Transpose::kNo, out, in, batch, 1, delta, out, x, in, 0,
+               gradient + layer.weight, in);
       kernel.columnSums(delta, gradient + layer.bias, batch, out);
     }
     const float* weight = parameters + layer.weight;
     if (l == 0) {
       if (d_input == nullptr) return;
-      gemm(Transpose::kNo, Transpose::kNo, batch, count, out, 1, delta, out, weight + first, in, 0,
-           d_input, count);
+      product_(Transpose::kNo, Transpose::kNo, batch, count, out, 1, delta, out, weight + first, in,
+               0, d_input, count);
       return;
     }
-    gemm(Transpose::kNo, Transpose::kNo, batch, in, out, 1, delta, out, weight, in, 0, next, in);
+    product_(Transpose::kNo, Transpose::kNo, batch, in, out, 1, delta, out, weight, in, 0, next,
+             in);
     const float* activations = workspace.activations_[l - 1].data();
     if (rows == nullptr) kernel.maskRelu(next, activations, batch * in);
     for (std::size_t b = 0; rows != nullptr && b < batch; ++b) {

@@ -3,9 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <charconv>
-#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -17,6 +15,7 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
+#include "pmeta_core/base/process.h"
 #include "pmeta_core/env/model_check.h"
 #include "pmeta_core/env/tabular_env.h"
 #include "pmeta_core/env/trajectory_check.h"
@@ -65,19 +64,14 @@ constexpr char kUsage[] =
                                        folder) on fresh episodes, at least N (100), of its own task,
                                        or of every task if it is a meta-policy
 
+Ctrl-C, SIGTERM or a closed terminal stops a run or a sweep when the round is over, a second one at
+once; other commands end at once. That nobody reads the output any more (| head) stops nothing.
 CONFIG is a YAML file, e.g. config/gridworld.yaml. A key may be shortened to its last part where that
 is unambiguous (lambda for personal.lambda). Results go to results_dir, by default ~/.ros/pmeta.
 )";
 
-std::atomic<bool> g_stop{false};
-
 // a round of large networks takes minutes, and only whole ones are kept
-void onSignal(int signal) {
-  constexpr char kText[] = "\nstopping when the round is over; once more stops at once\n";
-  g_stop = true;
-  std::signal(signal, SIG_DFL);
-  if (::write(STDERR_FILENO, kText, sizeof kText - 1) < 0) return;  // nobody to tell
-}
+constexpr char kAfterTheRound[] = "\nstopping when the round is over; once more stops at once\n";
 
 struct Arguments {
   std::vector<std::string> words;  ///< all that is neither an option nor ROS's own remapping
@@ -182,9 +176,15 @@ int run(Arguments arguments) {
   const std::string resume = takeResume(arguments);
   const Experiment experiment = loadExperiment(config, resume, arguments);
   pmeta::ResumePoint point;
+  // takes long for large grids; until a run folder is begun, a signal ends the program at once
+  experiment.optimalReturn(0);
+  pmeta::heedStopSignals(kAfterTheRound);
+  // before the manifest is written anew
+  const std::string other_machine = resume.empty() ? "" : pmeta::otherMachine(experiment);
   pmeta::RunLog log = resume.empty() ? pmeta::RunLog(experiment) : reopen(experiment, point);
   std::cout << "settings\n" << experiment.table() << std::flush;
   printNotes(experiment);
+  if (!other_machine.empty()) std::cerr << "warning: " << other_machine << "\n";
   if (point.round > 0) std::cout << "going on after round " << point.round << std::endl;
   pmeta::RunConsole console(experiment, isatty(STDOUT_FILENO) != 0);
   const pmeta::LocalResult result = pmeta::runLocally(
@@ -192,7 +192,7 @@ int run(Arguments arguments) {
       [&](const pmeta::RoundBook::Round& round) {
         const std::string line = console.take(round);
         if (!line.empty()) std::cout << line << std::endl;
-        return !g_stop;
+        return !pmeta::stopSignalled();
       },
       point.round);
   log.finish(result.stopped ? "stopped" : "finished");
@@ -208,6 +208,7 @@ int run(Arguments arguments) {
 }
 
 int sweep(Arguments arguments) {
+  pmeta::heedStopSignals(kAfterTheRound);
   pmeta::SweepPlan plan;
   plan.config = takeConfig(arguments);
   plan.assignments = arguments.words;
@@ -227,7 +228,7 @@ int sweep(Arguments arguments) {
   int done = 0;
   int total = 0;
   const pmeta::SweepResult result =
-      pmeta::runSweep(plan, g_stop, [&](const pmeta::SweepProgress& progress) {
+      pmeta::runSweep(plan, pmeta::stopSignalled(), [&](const pmeta::SweepProgress& progress) {
         done = progress.done;
         total = progress.total;
         if (!progress.in_use.empty()) std::cerr << "left out: " << progress.in_use << std::endl;
@@ -290,7 +291,6 @@ int convergence(Arguments arguments) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const auto report =
       pmeta::measureConvergence(settings, [&](const std::string& what, double done) {
-        if (g_stop) throw Error("stopped; nothing was written.");
         std::fprintf(stderr, terminal ? "\r\033[K%3.0f %%  %s" : "%3.0f %%  %s\n", 100 * done,
                      what.c_str());
       });
@@ -337,9 +337,9 @@ int evaluate(const Arguments& arguments) {
     throw Error("--task is " + std::to_string(arguments.task) + " but must be from 0 to " +
                 std::to_string(experiment.totalTasks() - 1) + ".");
   }
-  std::cout << policy.description() << "\n";
+  std::cout << policy.description() << std::endl;
   const int only = arguments.task < 0 ? policy.task() : arguments.task;
-  for (int task = 0; task < experiment.totalTasks() && !g_stop; ++task) {
+  for (int task = 0; task < experiment.totalTasks(); ++task) {
     if (only >= 0 && task != only) continue;
     // what a personal policy knew of its task went with its agent: it explores anew
     const bool explores = experiment.contextEpisodes().size() > 1;
@@ -351,7 +351,7 @@ int evaluate(const Arguments& arguments) {
                 shortNumber(stats.std).c_str(), stats.episodes);
     std::fflush(stdout);
   }
-  return g_stop ? 130 : 0;
+  return 0;
 }
 
 int dispatch(int argc, char** argv) {
@@ -378,10 +378,13 @@ int dispatch(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::signal(SIGINT, onSignal);
-  std::signal(SIGTERM, onSignal);
+  pmeta::prepareProcess();
   try {
-    return dispatch(argc, argv);
+    const int code = dispatch(argc, argv);
+    if (!pmeta::standardOutputIsWhole()) {
+      throw Error("standard output cannot be written: is its disk full?");
+    }
+    return code;
   } catch (const std::exception& error) {
     std::cerr << "pmeta: " << error.what() << std::endl;
     return 1;

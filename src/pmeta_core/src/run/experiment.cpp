@@ -183,6 +183,13 @@ void Experiment::bind(Settings& s) {
   s.bind("learner", e.learner,
          "q_learning for tables, dqn for networks, sac for networks with continuous actions",
          kLearners);
+  if (e.learner != "q_learning") {
+    s.bind(
+        "arithmetic", e.arithmetic,
+        "matrix products of networks: native, with the instructions of this processor; portable, "
+        "slower, with the same result on every processor that has AVX2 and FMA",
+        {"native", "portable"});
+  }
   s.bind("seed", e.seed, "one seed, one result", Range::atLeast(0));
   s.bind("rounds", e.rounds, "C: how often the meta-policy is aggregated", Range::between(1, 1e6));
   s.bind("updates_per_round", e.updates_per_round, "R: personalised and auxiliary updates a round",
@@ -296,6 +303,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   experiment.applyAlgorithm();
   experiment.checkAggregation();
   experiment.checkStability();
+  e.dqn.portable = e.sac.portable = e.sac.context.portable = e.arithmetic == "portable";
   e.results_dir = expandResultsDir(e.results_dir);
   if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
   if (e.run_id.empty()) {
@@ -456,10 +464,15 @@ std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
 }
 
 std::optional<double> Experiment::optimalReturn(int task) const {
-  const std::unique_ptr<Env> env = family_->make(task);
-  const auto* tabular = dynamic_cast<const TabularEnv*>(env.get());
-  if (tabular == nullptr) return std::nullopt;
-  return pmeta::optimalReturn(*tabular).mean;
+  std::call_once(optima_->computed, [this] {
+    for (int k = 0; k < totalTasks(); ++k) {
+      const std::unique_ptr<Env> env = family_->make(k);
+      const auto* tabular = dynamic_cast<const TabularEnv*>(env.get());
+      optima_->returns.emplace_back();
+      if (tabular != nullptr) optima_->returns.back() = pmeta::optimalReturn(*tabular).mean;
+    }
+  });
+  return optima_->returns.at(static_cast<std::size_t>(task));
 }
 
 std::string Experiment::runDir() const {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/file.h"
 #include "pmeta_core/run/run_log.h"
 
 namespace pmeta {
@@ -236,6 +237,7 @@ void savePolicy(const std::string& path, const Model& model,
 }
 
 PolicyFile loadPolicy(const std::string& path) {
+  requireRegularFile(path, "the policy file");
   std::error_code error;
   const std::uint64_t file_size = std::filesystem::file_size(path, error);
   std::ifstream file(path, std::ios::binary);

@@ -14,7 +14,10 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/file.h"
+#include "pmeta_core/base/format.h"
+#include "pmeta_core/base/number.h"
 #include "pmeta_core/base/version.h"
+#include "pmeta_core/nn/machine.h"
 
 namespace pmeta {
 namespace {
@@ -56,6 +59,7 @@ std::string constantManifest(const Experiment& experiment, const std::string& st
   manifest["settings_hash"] = experiment.settingsHash();
   manifest["commit"] = commit();
   manifest["versions"] = versions();
+  manifest["machine"] = machine();
   manifest["tasks"] = Json::array();
   for (int task = 0; task < experiment.totalTasks(); ++task) {
     const Split split = experiment.isTestTask(task) ? Split::kTest : Split::kTrain;
@@ -94,6 +98,7 @@ RunLock takeNew(const Experiment& experiment) {
 
 // the whole lines of rounds 1 to `last`, with the header; `evaluated` is the last that has lines
 std::string firstRounds(const std::string& path, int last, int evaluated) {
+  requireRegularFile(path, "the table");
   std::ifstream file(path);
   std::string line;
   std::string kept;
@@ -446,6 +451,7 @@ const char* RunLog::csvHeader() {
 
 std::string RunLog::csvLine(const RoundRow& row) {
   const TaskReturn& r = row.result;
+  const NumbersWithDots dots;
   char seconds[32];
   std::snprintf(seconds, sizeof seconds, "%.6f", r.seconds);
   return std::to_string(r.round) + "," + std::to_string(r.task) + "," + name(r.split) + "," +
@@ -474,6 +480,26 @@ void RunLog::writeManifest(const std::string& status, const std::string& reason)
 std::string runStatus(const std::string& run_dir) {
   const std::string status = manifestStatus(run_dir);
   return status == "running" && RunLock::holder(run_dir).empty() ? "interrupted" : status;
+}
+
+std::string otherMachine(const Experiment& experiment) {
+  // tables have no matrix products; portable ones are the same everywhere
+  if (experiment.settings().learner == "q_learning") return "";
+  const bool portable = experiment.settings().arithmetic == "portable";
+  const std::string path = experiment.runDir() + "/manifest.json";
+  if (!std::filesystem::exists(path)) return "";
+  const Json manifest = Json::parse(readFile(path, "the manifest"), nullptr, false);
+  if (!manifest.is_object() || !manifest.contains("machine")) return "";
+  const Json& before = manifest["machine"];
+  const std::map<std::string, std::string> now = machine();
+  for (const char* part : {"products", "processor", "glibc"}) {
+    if (portable && part != std::string("glibc")) continue;
+    if (!before.is_object() || !before.contains(part) || before[part] == now.at(part)) continue;
+    return "the run was begun on another machine (" + std::string(part) + " " +
+           shown(before[part].is_string() ? before[part].get<std::string>() : "") + ", here " +
+           shown(now.at(part)) + "): its numbers may differ from those of a run that stays on one.";
+  }
+  return "";
 }
 
 void requireResumable(const std::string& run_dir) {

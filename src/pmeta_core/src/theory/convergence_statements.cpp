@@ -4,6 +4,7 @@
 #include <limits>
 #include <numeric>
 
+#include "pmeta_core/base/number.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/theory/convergence.h"
 
@@ -26,6 +27,7 @@ constexpr double kNearExponent = 0.1;
 constexpr double kExponentFrom = 5;
 
 std::string rounded(double value, int digits = 2) {
+  const NumbersWithDots dots;
   char text[32];
   std::snprintf(text, sizeof text, "%.*g", digits, value);
   return text;

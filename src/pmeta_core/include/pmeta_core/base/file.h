@@ -17,4 +17,9 @@ void requireRegularFile(const std::string& path, const std::string& what);
 std::string readFile(const std::string& path, const std::string& what,
                      std::size_t most = kLargestFile);
 
+/// The same, but for the process's own descriptors (/dev/fd/N, /dev/stdin), which may be of any
+/// kind: a shell gives such a name to a command's output, `<(command)`.
+std::string readFileOrPipe(const std::string& path, const std::string& what,
+                           std::size_t most = kLargestFile);
+
 }  // namespace pmeta

@@ -20,6 +20,7 @@ struct ContextSettings {
   /// In training a context's rows come from so many transitions in a row, as they do at test time,
   /// where all of them may be of one wrong guess; 0: from all that are kept, the sure among them.
   int window = 0;
+  bool portable = false;  ///< see MlpSpec; set by the experiment's `arithmetic`
   int per_update = 1;   ///< contexts of one update, each giving its z to an equal part of the batch
   bool symlog = false;  ///< context rows hold sign(x) ln(1 + |x|) (Hafner et al., 2023) for each x
   double kl_weight = 0.1;         ///< weight of KL(q(z|c) || N(0, I))

@@ -39,6 +39,7 @@ struct DqnSettings {
   double priority_alpha = 0.6;           ///< how far priorities count; 0: uniform replay
   double priority_beta = 0.4;            ///< how far importance weights correct for that
   int evaluation_episodes = 10;          ///< greedy episodes of one evaluation
+  bool portable = false;                 ///< see MlpSpec; set by the experiment's `arithmetic`
 };
 
 /// Binds all of them below `prefix`, e.g. "dqn.".

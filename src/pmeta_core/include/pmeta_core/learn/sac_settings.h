@@ -25,6 +25,7 @@ struct SacSettings {
   std::string task_encoding = "one_hot";
   ContextSettings context;      ///< with task_encoding "inference"
   int evaluation_episodes = 5;  ///< episodes of one evaluation, by tanh(mean)
+  bool portable = false;        ///< see MlpSpec; set by the experiment's `arithmetic`
 
   // what a round does besides resetting parameters
   std::string targets_at_round = "keep";  ///< target critics: "keep", or "meta": the meta-policy's

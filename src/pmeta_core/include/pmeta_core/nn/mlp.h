@@ -7,6 +7,7 @@
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/base/rng.h"
 #include "pmeta_core/nn/aligned.h"
+#include "pmeta_core/nn/gemm.h"
 
 namespace pmeta {
 
@@ -17,6 +18,7 @@ struct MlpSpec {
   std::vector<std::size_t> hidden;  ///< units of each hidden layer, all positive; may be empty
   std::size_t outputs = 0;          ///< positive
   bool dueling = false;             ///< two heads, Q = V + A - mean A (Wang et al., 2016, eq. 9)
+  bool portable = false;            ///< products by gemmEigen: the same bits on every processor
 };
 
 class Mlp;
@@ -104,6 +106,7 @@ class Mlp {
   void requireInputs(std::size_t first, std::size_t count) const;
 
   MlpSpec spec_;
+  decltype(&gemm) product_;
   std::vector<Layer> layers_;  // a dueling network's heads are one layer of 1 + outputs
   std::vector<Block> blocks_;
   std::size_t size_ = 0;

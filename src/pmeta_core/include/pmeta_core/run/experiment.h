@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,6 +44,7 @@ struct ExperimentSettings {
   std::string preset;                  ///< which of the file's presets; "" for none
   std::string algorithm = "pmeta";     ///< pmeta, model_averaging, independent or pooled
   std::string learner = "q_learning";  ///< q_learning (tables), dqn or sac (networks)
+  std::string arithmetic = "native";   ///< of networks: native or portable
   std::int64_t seed = 0;
   int rounds = 10;              ///< C
   int updates_per_round = 3;    ///< R
@@ -118,6 +120,7 @@ class Experiment {
   std::unique_ptr<PersonalLearner> makeLearner(int task) const;
 
   /// The best return any policy can have on the task, where it can be computed (tabular tasks).
+  /// The first call computes those of all tasks, which takes minutes on grids of 512 x 512.
   std::optional<double> optimalReturn(int task) const;
 
   /// Is a checkpoint due after this round?
@@ -145,6 +148,12 @@ class Experiment {
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
+  // shared by copies: computed once
+  struct Optima {
+    std::once_flag computed;
+    std::vector<std::optional<double>> returns;  // of each task
+  };
+
   Experiment() = default;
   static Experiment build(const YAML::Node& root, const std::string& source,
                           const std::vector<std::string>& overrides);
@@ -156,6 +165,7 @@ class Experiment {
 
   ExperimentSettings settings_;
   std::shared_ptr<EnvFamily> family_;
+  std::shared_ptr<Optima> optima_ = std::make_shared<Optima>();
   std::string yaml_;
   std::string table_;
   std::vector<std::string> notes_;
