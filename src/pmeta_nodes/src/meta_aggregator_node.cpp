@@ -51,6 +51,7 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
       console_(experiment, isTerminal()),
       roll_call_(experiment.totalTasks(), kSilence, kStartUp),
       mailbox_(8 * static_cast<std::size_t>(experiment.totalTasks()) + 16) {
+  if (log_) console_.recall(log_->dir() + "/rounds.csv");
   summary_.run_id = experiment.settings().run_id;
   summary_.experiment = experiment.settings().experiment;
   summary_.rounds = static_cast<std::uint32_t>(experiment.settings().rounds);

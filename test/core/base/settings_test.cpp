@@ -16,6 +16,25 @@ using test::errorOf;
 using test::TempDir;
 using test::writeFile;
 
+TEST(ParseYaml, ASecondDocumentIsRefused) {
+  EXPECT_EQ(errorOf([] { parseYaml("rounds: 5\n---\nrounds: 6\n", "a.yaml"); }),
+            "a.yaml holds 2 YAML documents, and only one is read: take out the line '---' between "
+            "them.");
+  EXPECT_EQ(parseYaml("---\nrounds: 5\n...\n", "a.yaml")["rounds"].as<int>(), 5);
+}
+
+TEST(RequirePlainName, RefusesWhatIsNoTextOrTooLong) {
+  EXPECT_EQ(errorOf([] { requirePlainName("run_id", "a\x1b[31m"); }),
+            "run_id is 'a?[31m' but must be a plain name, without blanks or slashes.");
+  EXPECT_NE(errorOf([] { requirePlainName("run_id", "a\xff"); }).find("'a?'"), std::string::npos);
+  EXPECT_NE(errorOf([] {
+              requirePlainName("run_id", std::string(201, 'a'));
+            }).find("of 201 bytes but must have at most 200."),
+            std::string::npos);
+  requirePlainName("run_id", std::string(200, 'a'));
+  requirePlainName("run_id", "\xE6\x97\xA5");
+}
+
 // one setting of each kind
 struct Sample {
   std::string title = "demo";

@@ -11,8 +11,10 @@
 namespace pmeta {
 namespace {
 
+using test::errorOf;
 using test::gridExperiment;
 using test::TempDir;
+using test::writeFile;
 
 // two training tasks, both policies, 100 environment steps a task and round
 RoundBook::Round roundOf(int round, double personal, double meta, double seconds = 2) {
@@ -160,6 +162,30 @@ TEST(RunConsole, SaysOfARunWhatItsRecordSays) {
   const std::vector<std::string> table = linesOf(console.table());
   ASSERT_EQ(table.size(), 7u);
   EXPECT_NE(table.back().find(mean), std::string::npos) << table.back();
+}
+
+TEST(RunConsole, ARunThatGoesOnRemembersItsBestRounds) {
+  const TempDir dir;
+  const Experiment experiment = gridExperiment({"results_dir:=" + dir.path()});
+  RunLog log(experiment);
+  RunConsole watched(experiment, true);
+  const LocalResult result = runLocally(experiment, &log, [&](const RoundBook::Round& round) {
+    watched.take(round);
+    return true;
+  });
+  RunConsole recalled(experiment, true);
+  recalled.recall(log.dir() + "/rounds.csv");
+  EXPECT_EQ(recalled.table(), watched.table());
+
+  // a run that has nothing behind it
+  writeFile(dir / "rounds.csv", std::string(RunLog::csvHeader()) + "\n");
+  RunConsole fresh(experiment, true);
+  fresh.recall(dir / "rounds.csv");
+  EXPECT_EQ(fresh.table(), "");
+  writeFile(dir / "rounds.csv",
+            std::string(RunLog::csvHeader()) + "\n1,99,train,personal,0,-1,0,9,10,3,0.1\n");
+  EXPECT_NE(errorOf([&] { fresh.recall(dir / "rounds.csv"); }).find("has a task 99"),
+            std::string::npos);
 }
 
 TEST(ListRunFolder, NamesWhatIsThere) {

@@ -167,7 +167,41 @@ TEST(Resume, CutsTheRecordBackToWhatTheCheckpointKnows) {
                 " ends with round 0 but the checkpoint knows 2 rounds: the run cannot be "
                 "resumed.");
   writeFile(path, "another header\n");
-  EXPECT_NE(errorOf([&] { RunLog::reopen(lost, 3); }).find("of this version"), std::string::npos);
+  EXPECT_EQ(errorOf([&] { RunLog::reopen(lost, 3); }),
+            path + " begins with 'another header' but must begin with '" + RunLog::csvHeader() +
+                "': it has been altered, or is of another version.");
+  std::filesystem::remove(path);
+  EXPECT_NE(errorOf([&] { RunLog::reopen(lost, 3); }).find("(No such file or directory)"),
+            std::string::npos);
+}
+
+TEST(Resume, TakesATableThatASpreadsheetHasSaved) {
+  const TempDir dir;
+  const Experiment whole = checkpointExperiment("table", dir / "whole");
+  finish(whole);
+  const Experiment experiment = checkpointExperiment("table", dir / "killed");
+  runUntilCrash(experiment, 3);
+  const std::string csv = experiment.runDir() + "/rounds.csv";
+  const std::string lines = std::regex_replace(readFile(csv), std::regex("\n"), "\r\n");
+  writeFile(csv, "\xEF\xBB\xBF" + lines + "\r\n\n");
+  resume(experiment);
+  EXPECT_TRUE(recordOf(experiment) == recordOf(whole));
+
+  const Experiment quoted = checkpointExperiment("table", dir / "quoted");
+  runUntilCrash(quoted, 3);
+  const std::string path = quoted.runDir() + "/rounds.csv";
+  writeFile(path, std::string(RunLog::csvHeader()) + "\n\"1\",\"0\"\n");
+  EXPECT_EQ(errorOf([&] { RunLog::reopen(quoted, 3); }),
+            path + " line 2 is '\"1\",\"0\"', which no run writes: it has been altered.");
+}
+
+TEST(Resume, ThroughALinkToTheRunFolder) {
+  const TempDir dir;
+  const Experiment experiment = checkpointExperiment("table", dir / "runs");
+  runUntilStopped(experiment, 3);
+  std::filesystem::create_directory_symlink(experiment.runDir(), dir / "link");
+  EXPECT_EQ(Experiment::resume(dir / "link").settingsHash(), experiment.settingsHash());
+  EXPECT_EQ(Experiment::resume(dir / "link/").runDir(), experiment.runDir());
 }
 
 TEST(Resume, TheManifestKeepsTheStart) {

@@ -382,7 +382,7 @@ TEST(RunLog, KeepsConfigManifestAndRounds) {
   log.finish("stopped");
   EXPECT_EQ(runStatus(log.dir()), "stopped");
   EXPECT_EQ(namesIn(log.dir()),
-            (std::vector<std::string>{"config.yaml", "lock", "manifest.json", "rounds.csv"}));
+            (std::vector<std::string>{"config.yaml", "manifest.json", "rounds.csv"}));
 }
 
 TEST(RunLog, ManifestTellsWhatRan) {

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <regex>
+#include <set>
 #include <stdexcept>
 
 #include "../support.h"
@@ -16,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using test::checkpointKinds;
 using test::checkpointYaml;
+using test::errorOf;
 using test::readFile;
 using test::TempDir;
 using test::writeFile;
@@ -96,6 +98,86 @@ TEST_P(SweepResume, WithoutAGoodCheckpointTheRunBeginsAnew) {
   sweep();
   EXPECT_EQ(readFile(path).find(",77.000000\n"), std::string::npos);
   EXPECT_EQ(runStatus(fs::path(path).parent_path()), "finished");
+}
+
+class Sweep : public ::testing::Test {
+ protected:
+  Sweep() {
+    writeFile(plan_.config, checkpointYaml("table"));
+    plan_.name = "s";
+  }
+
+  std::vector<std::string> valuesOf(const std::string& assignment) {
+    plan_.assignments = {assignment, "results_dir:=" + dir_.path()};
+    std::vector<std::string> names;
+    for (const Experiment& run : planSweep(plan_)) names.push_back(run.settings().run_id);
+    return names;
+  }
+
+  TempDir dir_;
+  SweepPlan plan_{"", dir_ / "experiment.yaml", {}};
+};
+
+TEST_F(Sweep, ListsMayHoldRanges) {
+  EXPECT_EQ(valuesOf("seed:=0-2,5"),
+            (std::vector<std::string>{"seed_0", "seed_1", "seed_2", "seed_5"}));
+  EXPECT_EQ(valuesOf("seed:=9223372036854775806-9223372036854775807"),
+            (std::vector<std::string>{"seed_9223372036854775806", "seed_9223372036854775807"}));
+  EXPECT_EQ(errorOf([&] { valuesOf("seed:=99999999999999999999-5"); }),
+            "the range 99999999999999999999-5 must be of whole numbers up to 9223372036854775807.");
+  EXPECT_EQ(errorOf([&] { valuesOf("seed:=0-100001"); }),
+            "the range 0-100001 must go up, by at most 100000.");
+}
+
+TEST_F(Sweep, ANameThatLeadsElsewhereIsRefused) {
+  plan_.name = "..";
+  EXPECT_EQ(errorOf([&] { valuesOf("seed:=0-1"); }),
+            "the sweep's name is '..' but must be a plain name, without blanks or slashes.");
+}
+
+TEST_F(Sweep, UnlikeSettingsHaveUnlikeFolders) {
+  const std::vector<std::string> alike = valuesOf("environment.sizes:=[4],[4, 5],\"[4,5,5]\",[45]");
+  EXPECT_EQ(std::set<std::string>(alike.begin(), alike.end()).size(), alike.size());
+
+  std::string one = "[4";
+  for (int i = 0; i < 150; ++i) one += ", 4";
+  const std::vector<std::string> longer =
+      valuesOf("environment.sizes:=" + one + "]," + one + ", 5]");
+  ASSERT_EQ(longer.size(), 2u);
+  EXPECT_NE(longer[0], longer[1]);
+  EXPECT_LE(longer[0].size(), 200u);
+  EXPECT_EQ(valuesOf("environment.sizes:=" + one + "],[4]")[0], longer[0]);
+}
+
+TEST_F(Sweep, WhatSomebodyElseWritesIsLeftAlone) {
+  valuesOf("seed:=3-4");
+  const std::vector<Experiment> runs = planSweep(plan_);
+  const RunLog held(runs.front());
+  const std::atomic<bool> stop{false};
+  std::vector<std::string> in_use;
+  SweepProgress last;
+  runSweep(plan_, stop, [&](const SweepProgress& progress) {
+    if (!progress.in_use.empty()) in_use.push_back(progress.in_use);
+    last = progress;
+  });
+  ASSERT_EQ(in_use.size(), 1u);
+  EXPECT_NE(in_use.front().find(runs.front().runDir() + " is being written by process"),
+            std::string::npos);
+  EXPECT_EQ(last.done, 1);
+  EXPECT_EQ(runStatus(runs.front().runDir()), "running");
+  EXPECT_EQ(runStatus(runs.back().runDir()), "finished");
+}
+
+TEST_F(Sweep, ARunOfOtherSettingsIsNotTouched) {
+  valuesOf("seed:=3-4");
+  const std::string run = planSweep(plan_).back().runDir();
+  { const RunLog cut_off(planSweep(plan_).back()); }
+  plan_.assignments.push_back("lambda:=3");
+  const std::atomic<bool> stop{false};
+  const std::string sentence = errorOf([&] { runSweep(plan_, stop, [](const SweepProgress&) {}); });
+  EXPECT_EQ(sentence.rfind("the run " + run + " has other settings, with personal.lambda ", 0), 0u)
+      << sentence;
+  EXPECT_EQ(runStatus(run), "interrupted");
 }
 
 INSTANTIATE_TEST_SUITE_P(Learners, SweepResume, ::testing::ValuesIn(checkpointKinds()));

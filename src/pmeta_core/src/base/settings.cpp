@@ -17,6 +17,8 @@
 namespace pmeta {
 namespace {
 
+constexpr std::size_t kLongestName = 200;
+
 std::size_t editDistance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -52,6 +54,13 @@ std::string textOf(const YAML::Node& node) {
 // yaml-cpp's own conversion also takes words such as ".nan"
 bool parseNumber(const YAML::Node& node, double& value) {
   return node.IsScalar() && pmeta::parseNumber(node.Scalar(), value);
+}
+
+// what is allowed of a whole number; with the largest there is, where that is what was passed
+std::string allowedWhole(const YAML::Node& node, const std::string& allowed, std::int64_t most) {
+  double number = 0;
+  const bool beyond = parseNumber(node, number) && number > static_cast<double>(most / 2);
+  return beyond ? allowed + ", at most " + std::to_string(most) : allowed;
 }
 
 bool parseInteger(const YAML::Node& node, std::int64_t& value) {
@@ -171,7 +180,10 @@ void Settings::bind(const std::string& key, std::int64_t& value, const std::stri
        [=, &value](const YAML::Node& node, const std::string& where) {
          std::int64_t number = 0;
          if (!parseInteger(node, number) || !range.contains(static_cast<double>(number))) {
-           refuse(key, node, where, allowed);
+           refuse(key, node, where,
+                  std::isfinite(range.high)
+                      ? allowed
+                      : allowedWhole(node, allowed, std::numeric_limits<std::int64_t>::max()));
          }
          value = number;
        },
@@ -186,7 +198,10 @@ void Settings::bind(const std::string& key, int& value, const std::string& doc, 
          std::int64_t number = 0;
          if (!parseInteger(node, number) || !range.contains(static_cast<double>(number)) ||
              number > std::numeric_limits<int>::max()) {
-           refuse(key, node, where, allowed);
+           refuse(key, node, where,
+                  std::isfinite(range.high)
+                      ? allowed
+                      : allowedWhole(node, allowed, std::numeric_limits<int>::max()));
          }
          value = static_cast<int>(number);
        },
@@ -212,6 +227,10 @@ void Settings::bind(const std::string& key, std::string& value, const std::strin
        [=, &value](const YAML::Node& node, const std::string& where) {
          if (!node.IsScalar() || (!choices.empty() && !contains(choices, node.Scalar()))) {
            refuse(key, node, where, allowed);
+         }
+         if (!isPlainText(node.Scalar())) {
+           throw Error(key + " is " + pmeta::shown(node.Scalar()) +
+                       " but must be UTF-8 text without control characters.");
          }
          value = node.Scalar();
        },
@@ -459,15 +478,14 @@ std::string nearest(const std::string& word, const std::vector<std::string>& can
 }
 
 void requirePlainName(const std::string& key, const std::string& value) {
-  constexpr std::size_t kLongest = 200;  // a file's name has at most 255 bytes, with its ending
   if (value.empty() || value.find_first_of("/ \\\"'") != std::string::npos || value == "." ||
       value == ".." || !isPlainText(value)) {
     throw Error(key + " is " + shown(value) +
                 " but must be a plain name in UTF-8, without blanks, quotes or slashes.");
   }
-  if (value.size() > kLongest) {
+  if (value.size() > kLongestName) {
     throw Error(key + " is " + shown(value) + ", a name of " + std::to_string(value.size()) +
-                " bytes, but must have at most " + std::to_string(kLongest) + ".");
+                " bytes, but must have at most " + std::to_string(kLongestName) + ".");
   }
 }
 

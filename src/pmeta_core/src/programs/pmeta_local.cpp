@@ -187,6 +187,7 @@ int run(Arguments arguments) {
   if (!other_machine.empty()) std::cerr << "warning: " << other_machine << "\n";
   if (point.round > 0) std::cout << "going on after round " << point.round << std::endl;
   pmeta::RunConsole console(experiment, isatty(STDOUT_FILENO) != 0);
+  console.recall(log.dir() + "/rounds.csv");
   const pmeta::LocalResult result = pmeta::runLocally(
       experiment, &log,
       [&](const pmeta::RoundBook::Round& round) {

@@ -93,6 +93,17 @@ class Handle {
   herr_t (*close_)(hid_t);
 };
 
+// A file is written under a name of its own and then renamed, and is whole when it is read: it
+// needs no lock, which some file systems do not have. HDF5 before 1.10.7 takes none only where
+// HDF5_USE_FILE_LOCKING=FALSE is in the environment.
+hid_t accessWithoutLocks() {
+  const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+#if H5_VERSION_GE(1, 10, 7)
+  H5Pset_file_locking(access, false, true);
+#endif
+  return access;
+}
+
 hid_t fileType(StateType type) {
   switch (type) {
     case StateType::kFloat32:
@@ -169,8 +180,9 @@ class Hdf5Writer : public StateWriter {
         creation_(H5Pcreate(H5P_FILE_CREATE), H5Pclose),
         links_(H5Pcreate(H5P_LINK_CREATE), H5Pclose),
         dataset_(H5Pcreate(H5P_DATASET_CREATE), H5Pclose),
+        access_(accessWithoutLocks(), H5Pclose),
         file_((H5Pset_userblock(creation_, kUserBlock),
-               H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation_, H5P_DEFAULT)),
+               H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation_, access_)),
               H5Fclose) {
     if (!file_.good()) fail();
     H5Pset_create_intermediate_group(links_, 1);
@@ -208,7 +220,7 @@ class Hdf5Writer : public StateWriter {
   }
 
   std::string path_;
-  Handle creation_, links_, dataset_;
+  Handle creation_, links_, dataset_, access_;
   Handle file_;
 };
 
@@ -328,7 +340,9 @@ void checkFile(const std::string& path) {
 class CheckpointFile::Reader : public StateReader {
  public:
   explicit Reader(const std::string& path)
-      : path_(path), file_(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose) {
+      : path_(path),
+        access_(accessWithoutLocks(), H5Pclose),
+        file_(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access_), H5Fclose) {
     if (!file_.good()) refuseFile(path_, "HDF5 cannot open it");
   }
 
@@ -380,6 +394,7 @@ class CheckpointFile::Reader : public StateReader {
   }
 
   std::string path_;
+  Handle access_;
   Handle file_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
 
 namespace pmeta {
@@ -76,6 +77,29 @@ bool RunConsole::isDue(const RoundBook::Round& round) const {
   if (silence_ >= kLongestSilence) return true;
   if (round.rows.empty()) return false;
   return terminal_ || tenths(round.summary.round, rounds_) != printed_tenths_;
+}
+
+void RunConsole::recall(const std::string& rounds_csv) {
+  RoundBook::Round round;
+  const auto close = [&] {
+    if (round.rows.empty()) return;
+    setMeans(round, adapted_);
+    takeRows(round);
+    round.rows.clear();
+    evaluated_ = true;
+  };
+  readRounds(rounds_csv, [&](const RoundRow& row, const std::string&) {
+    if (row.result.task >= static_cast<int>(tasks_.size())) {
+      throw Error(rounds_csv + " has a task " + std::to_string(row.result.task) +
+                  ", and the run has none of that number: it has been altered.");
+    }
+    if (row.result.round != round.summary.round) close();
+    round.summary.round = row.result.round;
+    round.rows.push_back(row);
+    return true;
+  });
+  close();
+  steps_ = 0;  // those of a past that was not watched
 }
 
 std::string RunConsole::take(const RoundBook::Round& round) {

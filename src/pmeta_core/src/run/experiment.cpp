@@ -119,7 +119,8 @@ Experiment Experiment::parse(const std::string& text, const std::string& source,
 Experiment Experiment::resume(const std::string& run_dir, const std::vector<std::string>& overrides,
                               const std::string& of_config) {
   namespace fs = std::filesystem;
-  const fs::path dir = (fs::absolute(run_dir) / "").lexically_normal().parent_path();
+  // the folder itself, whatever link leads to it
+  const fs::path dir = (fs::weakly_canonical(run_dir) / "").lexically_normal().parent_path();
   const std::string config = (dir / "config.yaml").string();
   if (!fs::exists(config)) {
     throw Error("there is no run to resume in " + dir.string() + ": it has no config.yaml.");

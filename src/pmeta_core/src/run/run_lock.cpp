@@ -176,10 +176,13 @@ RunLock& RunLock::operator=(RunLock other) noexcept {
   return *this;
 }
 
-RunLock::~RunLock() {
+RunLock::~RunLock() { release(); }
+
+void RunLock::release() noexcept {
   if (fd_ < 0) return;
   ::unlink(path_.c_str());
   ::close(fd_);
+  fd_ = -1;
 }
 
 std::string RunLock::holder(const std::string& run_dir) {

@@ -4,13 +4,16 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <initializer_list>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/file.h"
@@ -96,24 +99,49 @@ RunLock takeNew(const Experiment& experiment) {
   return lock;
 }
 
+template <class Number>
+bool parseWhole(const std::string& text, Number& value) {
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value);
+  return result.ec == std::errc() && result.ptr == end && value >= 0;
+}
+
+template <class Word>
+bool parseWord(const std::string& text, std::initializer_list<Word> words, Word& word) {
+  for (const Word one : words) {
+    if (text != name(one)) continue;
+    word = one;
+    return true;
+  }
+  return false;
+}
+
+// what RunLog::csvLine() wrote
+bool parseRow(const std::string& line, RoundRow& row) {
+  std::vector<std::string> fields;
+  std::istringstream in(line);
+  for (std::string field; std::getline(in, field, ',');) fields.push_back(field);
+  TaskReturn& r = row.result;
+  return fields.size() == 11 && parseWhole(fields[0], r.round) && r.round > 0 &&
+         parseWhole(fields[1], r.task) &&
+         parseWord(fields[2], {Split::kTrain, Split::kTest}, r.split) &&
+         parseWord(fields[3], {Policy::kPersonal, Policy::kMeta}, r.policy) &&
+         parseWhole(fields[4], r.context_episodes) && parseNumber(fields[5], r.mean) &&
+         parseNumber(fields[6], r.std) && parseWhole(fields[7], r.episodes) &&
+         parseWhole(fields[8], row.env_steps) && parseWhole(fields[9], row.updates) &&
+         parseNumber(fields[10], r.seconds);
+}
+
 // the whole lines of rounds 1 to `last`, with the header; `evaluated` is the last that has lines
 std::string firstRounds(const std::string& path, int last, int evaluated) {
-  requireRegularFile(path, "the table");
-  std::ifstream file(path);
-  std::string line;
-  std::string kept;
+  std::string kept = std::string(RunLog::csvHeader()) + "\n";
   int newest = 0;
-  std::getline(file, line);
-  if (!file || line != RunLog::csvHeader()) {
-    throw Error(path + " is not that of a run of this version: it cannot be resumed.");
-  }
-  kept = line + "\n";
-  while (std::getline(file, line) && !file.eof()) {
-    const int round = std::atoi(line.c_str());
-    if (round < 1 || round > last) break;
-    newest = round;
+  readRounds(path, [&](const RoundRow& row, const std::string& line) {
+    if (row.result.round > last) return false;
+    newest = row.result.round;
     kept += line + "\n";
-  }
+    return true;
+  });
   if (newest != evaluated) {
     throw Error(path + " ends with round " + std::to_string(newest) + " but the checkpoint knows " +
                 std::to_string(evaluated) + " rounds: the run cannot be resumed.");
@@ -253,10 +281,7 @@ std::vector<RoundBook::Round> RoundBook::take(bool force) {
     }
     round.summary.broken_episodes = broken_episodes_;
     seconds_ += round.summary.seconds;
-    round.summary.personal_return = meanReturn(round.rows, Policy::kPersonal, Split::kTrain, 0);
-    const int context = contexts_.back();
-    round.summary.meta_return = meanReturn(round.rows, Policy::kMeta, Split::kTrain, context);
-    round.summary.test_return = meanReturn(round.rows, Policy::kMeta, Split::kTest, context);
+    setMeans(round, contexts_.back());
     round.summary.eta_seconds = seconds_ / next_ * (rounds_ - next_);
     taken.push_back(std::move(round));
     open_.erase(it);
@@ -434,7 +459,10 @@ void RunLog::write(const RoundBook::Round& round) {
   }
 }
 
-void RunLog::finish(const std::string& status) { writeManifest(status); }
+void RunLog::finish(const std::string& status) {
+  writeManifest(status);
+  lock_.release();
+}
 
 void RunLog::fail(const std::string& reason) noexcept {
   try {
@@ -442,6 +470,7 @@ void RunLog::fail(const std::string& reason) noexcept {
   } catch (const std::exception&) {
     // as where the disk is full: then nobody writes a run that "runs", which runStatus() sees
   }
+  lock_.release();
 }
 
 const char* RunLog::csvHeader() {
@@ -519,6 +548,43 @@ void requireUnfinished(const std::string& run_dir) {
   if (status == "finished") {
     throw Error("the run in " + run_dir + " is finished: there is nothing to resume.");
   }
+}
+
+void setMeans(RoundBook::Round& round, int adapted) {
+  RoundSummary& summary = round.summary;
+  summary.personal_return = meanReturn(round.rows, Policy::kPersonal, Split::kTrain, 0);
+  summary.meta_return = meanReturn(round.rows, Policy::kMeta, Split::kTrain, adapted);
+  summary.test_return = meanReturn(round.rows, Policy::kMeta, Split::kTest, adapted);
+}
+
+void readRounds(const std::string& path,
+                const std::function<bool(const RoundRow& row, const std::string& line)>& on_row) {
+  requireRegularFile(path, "the table");
+  std::ifstream file(path);
+  std::string line;
+  bool headed = false;
+  for (int number = 1; std::getline(file, line); ++number) {
+    // what a spreadsheet or an editor leaves behind
+    if (number == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (line.empty()) continue;
+    if (!headed) {
+      if (line != RunLog::csvHeader()) {
+        throw Error(path + " begins with " + shown(line) + " but must begin with '" +
+                    RunLog::csvHeader() + "': it has been altered, or is of another version.");
+      }
+      headed = true;
+      continue;
+    }
+    if (file.eof()) return;  // a line that was cut off
+    RoundRow row;
+    if (!parseRow(line, row)) {
+      throw Error(path + " line " + std::to_string(number) + " is " + shown(line) +
+                  ", which no run writes: it has been altered.");
+    }
+    if (!on_row(row, line)) return;
+  }
+  if (!headed) throw Error(path + " is empty: it has been altered, or was never written.");
 }
 
 void writeFileAtomically(const std::string& path, const std::string& text) {

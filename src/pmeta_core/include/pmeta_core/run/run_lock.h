@@ -26,6 +26,9 @@ class RunLock {
   RunLock(RunLock&& other) noexcept;
   RunLock& operator=(RunLock other) noexcept;
 
+  /// Lets the folder go before the end of the scope.
+  void release() noexcept;
+
   const std::string& path() const { return path_; }  ///< of the file
 
   /// Who writes that folder now, e.g. "process 4711 on host robot2"; "" if nobody does.

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <string>
 #include <tuple>
@@ -112,7 +113,7 @@ class RunLog {
   /// Waits until what has been written is on the disk.
   void sync();
 
-  /// Sets the manifest's status: "finished" or "stopped".
+  /// The last of all: sets the manifest's status, "finished" or "stopped", and lets the folder go.
   void finish(const std::string& status);
 
   /// Sets it to "failed" and says why, if the disk takes that: what went wrong comes first.
@@ -154,6 +155,16 @@ void requireUnfinished(const std::string& run_dir);
 
 /// The same, and that nobody writes.
 void requireResumable(const std::string& run_dir);
+
+/// Sets the mean returns of a round's summary from its rows; MP is after `adapted` exploration
+/// episodes.
+void setMeans(RoundBook::Round& round, int adapted);
+
+/// Hands over the rows of a rounds.csv, with the lines they stand in, until `on_row` returns false.
+/// A byte order mark, CRLF and blank lines do no harm, and a last line that was cut off is left
+/// out. Throws Error on what no run writes.
+void readRounds(const std::string& path,
+                const std::function<bool(const RoundRow& row, const std::string& line)>& on_row);
 
 /// Writes a whole file under a temporary name, then renames it: never half a file. Throws Error.
 void writeFileAtomically(const std::string& path, const std::string& text);
