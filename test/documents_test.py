@@ -121,7 +121,7 @@ class Desk:
         with open(str(log), "w") as out:
             process = subprocess.Popen(["bash", "-c", command], cwd=str(self.folder), env=env or self.env,
                                        stdin=subprocess.DEVNULL, stdout=out,
-                                       stderr=subprocess.STDOUT, preexec_fn=os.setsid)
+                                       stderr=subprocess.STDOUT, preexec_fn=as_a_terminal_does)
         return process, log
 
     def type(self, command, seconds, env=None):
@@ -142,6 +142,12 @@ class Desk:
         finally:
             end(process)
         assert "Traceback" not in log.read_text(), log.read_text()[-4000:]
+
+
+def as_a_terminal_does():
+    """A group of its own, that heeds Ctrl-C whatever the tests' own parent ignores."""
+    os.setsid()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def end(process):

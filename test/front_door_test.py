@@ -381,7 +381,8 @@ def test_a_sweep_does_each_run_once_and_goes_on_where_it_stopped(tmp_path):
     other = run([LOCAL, "sweep", CONFIG, "lambda:=5,10", "algorithm:=pmeta,model_averaging",
                  "seed:=0-2", "rounds:=5", "results_dir:=%s" % tmp_path, "--name", "s"])
     assert other.returncode == 1
-    assert "has other settings: give this sweep another --name" in other.stderr
+    assert ("has other settings, with rounds 10 where this sweep has 5: give this sweep another "
+            "--name") in other.stderr
 
 
 def test_an_interrupted_sweep_keeps_what_is_finished(tmp_path):
@@ -510,7 +511,8 @@ def test_nodes_say_what_they_miss(tmp_path):
         result = run(["rosrun", "pmeta_nodes", "task_agent", "_task:=9",
                       "_config_file:=%s" % CONFIG], env=env)
         assert result.returncode == 1
-        assert "task is 9 but must be from 0 to 4." in result.stderr
+        assert ("the private parameter task is '9' but must be a whole number from 0 to 4: give "
+                "_task:=VALUE.") in result.stderr
     finally:
         master.terminate()
         master.wait(timeout=20)

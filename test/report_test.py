@@ -203,7 +203,8 @@ def test_test_tasks_have_columns_and_a_figure(tmp_path):
     path = tmp_path / "r.html"
     report(tmp_path, "-o", path)
     found = look(path)
-    best, learning, tasks, _ = found["tables"]
+    best, learning, quartiles, tasks, _ = found["tables"]
+    assert quartiles[0][1] == "IQM of" and len(quartiles) == 4
     assert best[0][2:] == ["best", "last", "fresh (best)", "fresh (own best)", "fresh (last)"]
     assert best[1][5] == spread([fresh_mean(f, "own_best", "personal") for f in folders])
     last = spread([curve(f, "meta", "test", 2)[-1] for f in folders])

@@ -105,6 +105,7 @@ std::string labelOf(const MarkerArray& markers, int id) {
 
 TEST(TrajectoryViewNode, AllIsShownAsOfTheLastCompleteRound) {
   using pmeta_msgs::RoundSummary;
+  using pmeta_msgs::TaskReturn;
   ros::NodeHandle nh;
   ros::Publisher rounds = nh.advertise<RoundSummary>("/pmeta/round", 4);
   ros::Publisher returns = nh.advertise<TaskReturn>("/pmeta/returns", 4);

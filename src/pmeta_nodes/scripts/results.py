@@ -125,7 +125,9 @@ def run_missing(plan, options):
 
 def run_until(words, end):
     """The exit code. At the end of the time, or with Ctrl-C, rounds are finished and kept."""
-    process = subprocess.Popen(words)
+    # a shell has its background jobs ignore Ctrl-C, and whatever these start
+    process = subprocess.Popen(
+        words, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     while True:
         try:
             left = None if end is None else max(0, end - time.monotonic())

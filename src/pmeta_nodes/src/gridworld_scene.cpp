@@ -291,7 +291,8 @@ void drawTask(const GridGeometry& grid, int task, const Layout& layout, const Sc
     scene.markers.push_back(drawPath(picture));
     scene.markers.push_back(drawLandmark(picture));
     scene.markers.push_back(drawEnds(picture));
-    const bool lost = view.episode && view.episode->truncated;
+    const bool plays = view.episode && (content.has_meta || !is_meta);
+    const bool lost = plays && view.episode->truncated;
     drawLabels(picture, resultText(view, content, is_meta) + (lost ? ", landmark not reached" : ""),
                scene);
   }

@@ -125,6 +125,7 @@ void MetaAggregatorNode::awaitOnlookers() {
   if (!missing.empty() && !stop_)
     ROS_WARN("%s goes on without %s.", round.c_str(), missing.c_str());
   // an aggregator that is started again finds them there, or closed for good
+  ros::NodeHandle own("~");
   own.setParam("await_viewer", false);
   own.setParam("await_recorder", false);
 }

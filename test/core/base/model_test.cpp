@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "../support.h"
+#include "pmeta_core/base/format.h"
 
 namespace pmeta {
 namespace {
@@ -99,7 +100,7 @@ TEST(ModelLayout, RefusesBadNames) {
     EXPECT_EQ(errorOf([&] {
                 ModelLayout(Precision::kFloat64, {{name, {2}}});
               }),
-              "a model block needs a name without blanks, not '" + name + "'.");
+              "a model block needs a name without blanks, not " + shown(name) + ".");
   }
 }
 

@@ -118,37 +118,6 @@ class Sweep : public ::testing::Test {
   SweepPlan plan_{"", dir_ / "experiment.yaml", {}};
 };
 
-TEST_F(Sweep, ListsMayHoldRanges) {
-  EXPECT_EQ(valuesOf("seed:=0-2,5"),
-            (std::vector<std::string>{"seed_0", "seed_1", "seed_2", "seed_5"}));
-  EXPECT_EQ(valuesOf("seed:=9223372036854775806-9223372036854775807"),
-            (std::vector<std::string>{"seed_9223372036854775806", "seed_9223372036854775807"}));
-  EXPECT_EQ(errorOf([&] { valuesOf("seed:=99999999999999999999-5"); }),
-            "the range 99999999999999999999-5 must be of whole numbers up to 9223372036854775807.");
-  EXPECT_EQ(errorOf([&] { valuesOf("seed:=0-100001"); }),
-            "the range 0-100001 must go up, by at most 100000.");
-}
-
-TEST_F(Sweep, ANameThatLeadsElsewhereIsRefused) {
-  plan_.name = "..";
-  EXPECT_EQ(errorOf([&] { valuesOf("seed:=0-1"); }),
-            "the sweep's name is '..' but must be a plain name, without blanks or slashes.");
-}
-
-TEST_F(Sweep, UnlikeSettingsHaveUnlikeFolders) {
-  const std::vector<std::string> alike = valuesOf("environment.sizes:=[4],[4, 5],\"[4,5,5]\",[45]");
-  EXPECT_EQ(std::set<std::string>(alike.begin(), alike.end()).size(), alike.size());
-
-  std::string one = "[4";
-  for (int i = 0; i < 150; ++i) one += ", 4";
-  const std::vector<std::string> longer =
-      valuesOf("environment.sizes:=" + one + "]," + one + ", 5]");
-  ASSERT_EQ(longer.size(), 2u);
-  EXPECT_NE(longer[0], longer[1]);
-  EXPECT_LE(longer[0].size(), 200u);
-  EXPECT_EQ(valuesOf("environment.sizes:=" + one + "],[4]")[0], longer[0]);
-}
-
 TEST_F(Sweep, WhatSomebodyElseWritesIsLeftAlone) {
   valuesOf("seed:=3-4");
   const std::vector<Experiment> runs = planSweep(plan_);

@@ -303,7 +303,7 @@ TEST(TaskAgent, ASimulationThatAlwaysBreaksDownFailsTheTask) {
   const test::TempDir dir;
   const std::string model =
       std::regex_replace(test::readFile(PMETA_TEST_DATA "/../../config/models/walker2d.xml"),
-                         std::regex("timestep=\"[^\"]*\""), "timestep=\"0.05\"");
+                         std::regex("timestep=\"[^\"]*\""), "timestep=\"0.5\"");
   test::writeFile(dir / "walker2d.xml", model);
   const Experiment experiment = Experiment::parse(
       "learner: sac\nupdates_per_round: 3\n"

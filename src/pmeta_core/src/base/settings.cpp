@@ -228,10 +228,6 @@ void Settings::bind(const std::string& key, std::string& value, const std::strin
          if (!node.IsScalar() || (!choices.empty() && !contains(choices, node.Scalar()))) {
            refuse(key, node, where, allowed);
          }
-         if (!isPlainText(node.Scalar())) {
-           throw Error(key + " is " + pmeta::shown(node.Scalar()) +
-                       " but must be UTF-8 text without control characters.");
-         }
          value = node.Scalar();
        },
        [&value] { return quoted(value); }});
