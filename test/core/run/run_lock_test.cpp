@@ -87,7 +87,7 @@ TEST(RunLock, AFolderThatIsNotThereIsRefused) {
                 "results_dir:=DIR.");
 }
 
-// what a process leaves where the file system cannot lock; see run_lock_test.py for such a one
+// what a process leaves where the file system cannot lock
 TEST(RunLock, AFileThatNamesALivingProcessCountsWithoutLocks) {
   const TempDir dir;
   const auto names = [&](const std::string& text) {
