@@ -11,7 +11,7 @@ namespace pmeta {
 /// sentence.
 void prepareProcess();
 
-/// From now on the first SIGINT, SIGTERM or SIGHUP sets stopRequested() and writes `told` to
+/// From now on the first SIGINT, SIGTERM or SIGHUP sets stopSignalled() and writes `told` to
 /// standard error; a second ends the process at once. A SIGHUP that is ignored, as under nohup,
 /// stays so. `told` must live as long as the process.
 void heedStopSignals(const char* told = "");
