@@ -30,6 +30,7 @@ constexpr std::uint32_t kMetaPolicies = 8;
 
 TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task, bool resume)
     : experiment_(experiment),
+      settings_hash_(experiment.settingsHash()),
       resume_(resume),
       agent_(experiment, task),
       checkpoints_(experiment, task, agent_.layout()),
@@ -111,9 +112,9 @@ void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::Ptr& msg) {
                       pmeta::shown(msg->run_id).c_str(), pmeta::shown(status_.run_id).c_str());
     return;
   }
-  if (msg->settings_hash != experiment_.settingsHash()) {
+  if (msg->settings_hash != settings_hash_) {
     const std::string mismatch =
-        pmeta::otherSettings("the aggregator", msg->settings_hash, experiment_.settingsHash());
+        pmeta::otherSettings("the aggregator", msg->settings_hash, settings_hash_);
     ROS_ERROR_THROTTLE(10, "ignored: %s", mismatch.c_str());
     return setState(AgentStatus::WAITING, mismatch);
   }
@@ -209,15 +210,17 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     status_.update = 0;
   }
   setState(AgentStatus::TRAINING, "training round " + std::to_string(round));
-  if (!round_end_) round_end_ = Clock::now();
+  const Clock::time_point start = Clock::now();
+  if (!round_end_) round_end_ = start;
   auto result = agent_.trainRound(meta, [this](int done) {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.update = static_cast<std::uint32_t>(done);
     return !stop_;
   });
   if (!result) return;
-  const Clock::time_point before = *std::exchange(round_end_, Clock::now());
-  const double seconds = std::chrono::duration<double>(*round_end_ - before).count();
+  const Clock::time_point end = Clock::now();
+  const Clock::time_point before = *std::exchange(round_end_, end);
+  const double seconds = std::chrono::duration<double>(end - before).count();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.env_steps_per_s = static_cast<double>(result->env_steps) / seconds;
@@ -225,7 +228,7 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     status_.loss = result->loss;
     status_.broken_episodes = static_cast<std::uint64_t>(agent_.brokenEpisodes());
     status_.distance_to_meta = result->distance;
-    status_.train_s = seconds;
+    status_.train_s = std::chrono::duration<double>(end - start).count();
   }
   if (experiment_.checkpointsAfter(round) || meta.checkpoint) saveCheckpoint(round);
   // before the aggregator can end the run, and with it this process

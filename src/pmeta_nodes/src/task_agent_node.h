@@ -72,6 +72,7 @@ class TaskAgentNode {
   HealthReport health();
 
   const pmeta::Experiment& experiment_;
+  const std::string settings_hash_;
   const bool resume_;
   pmeta::TaskAgent agent_;  ///< the trainer's, as are the three below
   pmeta::CheckpointFolder checkpoints_;
