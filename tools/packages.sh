@@ -1,7 +1,7 @@
 # Which packages pMeta needs, and installing them.
 
 PACKAGES_BUILD="g++ make cmake git ca-certificates
-  libdnnl-dev libeigen3-dev libhdf5-dev libsodium-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libbenchmark-dev libgtest-dev libgmock-dev"
+  libdnnl-dev libeigen3-dev libhdf5-dev libsodium-dev libtinyxml2-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libbenchmark-dev libgtest-dev libgmock-dev"
 PACKAGES_PYTHON="python3-matplotlib python3-numpy python3-yaml python3-pytest"
 PACKAGES_MUJOCO="libmujoco-dev"
 PACKAGES_TEST="chromium locales"
@@ -40,7 +40,7 @@ missing_packages() {
 
 setup() {
   command -v dpkg-query > /dev/null ||
-    die "set-up needs Debian 12, or Ubuntu 20.04 with ROS Noetic; on other systems install ROS 1, MuJoCo 2.2, Eigen, HDF5, libsodium, yaml-cpp, nlohmann-json and use catkin_make."
+    die "set-up needs Debian 12, or Ubuntu 20.04 with ROS Noetic; on other systems install ROS 1, MuJoCo 2.2, Eigen, HDF5, libsodium, TinyXML-2, yaml-cpp, nlohmann-json and use catkin_make."
   if use_noetic && [ -z "${MUJOCO_DIR:-}" ]; then
     die "Ubuntu has no MuJoCo package: unpack MuJoCo 2.2 and set MUJOCO_DIR to its folder."
   fi

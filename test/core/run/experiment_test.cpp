@@ -43,6 +43,20 @@ TEST(Experiment, TheSettingsHashIsThatOfWhatDefinesARun) {
   EXPECT_NE(gridExperiment({"run_id:=b"}).settingsHash(), hash);
 }
 
+TEST(Experiment, WhatCannotBeLearntOrHeldNamesItsSettings) {
+  const auto cartPole = [](const std::vector<std::string>& overrides) {
+    return Experiment::parse("{learner: dqn, environment: {name: cart_pole}}", "text", overrides);
+  };
+  EXPECT_EQ(errorOf([&] {
+              cartPole({"n_step:=1000", "warm_up_steps:=64"});
+            }),
+            "dqn.warm_up_steps is 64 but dqn.n_step is 1000: nothing could be sampled; give at "
+            "least as many.");
+  const Experiment large = cartPole({"hidden:=[1000000000, 1000000000]"});
+  EXPECT_NE(errorOf([&] { large.makeLearner(0); }).find("dqn.hidden = [1000000000, 1000000000]"),
+            std::string::npos);
+}
+
 TEST(Experiment, ModelAveragingIsSettings) {
   const Experiment e = gridExperiment({"algorithm:=model_averaging", "personal_init:=keep"});
   EXPECT_EQ(e.settings().personal.lambda, 0);

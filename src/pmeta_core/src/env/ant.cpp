@@ -86,7 +86,7 @@ void AntFwdBackFamily::bind(Settings& settings) {
 }
 
 void AntFwdBackFamily::build(std::uint64_t) {
-  model_ = MujocoModel::open(mujoco_.model_file, Ant::layout());
+  model_ = mujoco_.open(Ant::layout());
   tasks_ = angles_;
   tasks_.insert(tasks_.end(), test_angles_.begin(), test_angles_.end());
 }

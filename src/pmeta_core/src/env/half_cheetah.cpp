@@ -67,7 +67,7 @@ void HalfCheetah::observe(double* observation) const {
 
 void HalfCheetahFamily::build(HalfCheetahTask::Goal goal, const std::vector<double>& train,
                               const std::vector<double>& test) {
-  model_ = MujocoModel::open(mujoco_.model_file, HalfCheetah::layout());
+  model_ = mujoco_.open(HalfCheetah::layout());
   tasks_.clear();
   for (const double value : train) tasks_.push_back({goal, value});
   for (const double value : test) tasks_.push_back({goal, value});

@@ -1,5 +1,9 @@
 #include "pmeta_core/env/mujoco_env.h"
 
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/hash.h"
+#include "pmeta_core/env/model_files.h"
+
 namespace pmeta {
 
 MujocoEnv::MujocoEnv(const EnvSpec& spec, std::shared_ptr<const MujocoModel> model, int frame_skip)
@@ -52,10 +56,24 @@ double MujocoEnv::squaredControl() const {
 }
 
 void MujocoSettings::bind(Settings& settings) {
-  settings.bind("environment.model_file", model_file,
-                "MJCF file with the full path; \"\" means the shipped model");
+  settings.bind("environment.model_file", model.file, "MJCF file; \"\" means the shipped model");
+  settings.bind("environment.model_hash", model.hash,
+                "no model but that of this hash is taken; \"\" takes any");
   settings.bind("environment.horizon", horizon, "steps after which an episode is truncated",
                 Range::between(1, 1e6));
+}
+
+std::shared_ptr<const MujocoModel> MujocoSettings::open(const MujocoLayout& layout) {
+  auto opened = MujocoModel::open(model.file, layout);
+  const std::string found =
+      model.file.empty() ? hashText(shippedModel(layout.model)) : ModelFiles::find(model.file).hash;
+  if (!model.hash.empty() && model.hash != found) {
+    throw Error("the model " + opened->source() + " has the hash " + found +
+                ", but environment.model_hash is " + model.hash +
+                ": give the model that this was made with, or model_hash:=\"\" to take this one.");
+  }
+  model.hash = found;
+  return opened;
 }
 
 }  // namespace pmeta

@@ -70,7 +70,7 @@ void Walker2dParamsFamily::bind(Settings& settings) {
 }
 
 void Walker2dParamsFamily::build(std::uint64_t seed) {
-  base_ = MujocoModel::open(mujoco_.model_file, Walker2d::layout());
+  base_ = mujoco_.open(Walker2d::layout());
   const auto draw = [](Rng& rng) { return static_cast<int>(rng.below(1000000000)); };
   std::vector<int> seeds = givenOrDrawn(task_seeds_, train_tasks_, seed, Stream::kTaskDraw, draw);
   num_train_ = static_cast<int>(seeds.size());

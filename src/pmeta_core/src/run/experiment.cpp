@@ -11,16 +11,21 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <new>
+#include <stdexcept>
 #include <tuple>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/hash.h"
+#include "pmeta_core/env/model_files.h"
 #include "pmeta_core/personal/dqn_personal_learner.h"
 #include "pmeta_core/personal/sac_personal_learner.h"
 
 namespace pmeta {
 namespace {
+
+constexpr char kModels[] = "models";  // in a run's folder
 
 std::string formatUtc(const char* format) {
   const std::time_t now = std::time(nullptr);
@@ -108,12 +113,16 @@ std::string roundedDown(double value) {
 }  // namespace
 
 Experiment Experiment::load(const std::string& path, const std::vector<std::string>& overrides) {
-  return build(loadYamlFile(path), path, overrides);
+  namespace fs = std::filesystem;
+  // of a pipe, as of <(...), the folder says nothing
+  const bool is_file = fs::is_regular_file(path);
+  return build(loadYamlFile(path), path, overrides,
+               is_file ? fs::absolute(path).parent_path().string() : "");
 }
 
 Experiment Experiment::parse(const std::string& text, const std::string& source,
-                             const std::vector<std::string>& overrides) {
-  return build(parseYaml(text, source), source, overrides);
+                             const std::vector<std::string>& overrides, const std::string& folder) {
+  return build(parseYaml(text, source), source, overrides, folder);
 }
 
 Experiment Experiment::resume(const std::string& run_dir, const std::vector<std::string>& overrides,
@@ -151,8 +160,10 @@ Experiment Experiment::resume(const std::string& run_dir, const std::vector<std:
 
 std::map<std::string, std::string> Experiment::definingSettings(const std::string& yaml) {
   std::map<std::string, std::string> settings = flatSettings(parseYaml(yaml, "config.yaml"));
-  for (const char* key : {"results_dir", "pace", "publish_trajectories", "key_file",
-                          "checkpoint.interval", "aggregation.round_timeout"}) {
+  // of a model its hash counts, not where it is
+  for (const char* key :
+       {"results_dir", "pace", "publish_trajectories", "key_file", "checkpoint.interval",
+        "aggregation.round_timeout", "environment.model_file"}) {
     settings.erase(key);
   }
   return settings;
@@ -274,8 +285,18 @@ void Experiment::bindLearner(Settings& s) {
   pmeta::bind(s, "sac.", e.sac);
 }
 
+void Experiment::anchorPaths(const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::vector<std::string*> paths = {&settings_.results_dir, &settings_.key_file};
+  if (ModelChoice* model = family_->model()) paths.push_back(&model->file);
+  for (std::string* path : paths) {
+    if (path->empty() || path->front() == '~') continue;
+    *path = ((folder.empty() ? fs::current_path() : fs::path(folder)) / *path).string();
+  }
+}
+
 Experiment Experiment::build(const YAML::Node& root, const std::string& source,
-                             const std::vector<std::string>& overrides) {
+                             const std::vector<std::string>& overrides, const std::string& folder) {
   const std::vector<YAML::Node> files = choosePreset(root, source, overrides);
   Experiment experiment;
   experiment.settings_.learner =
@@ -286,11 +307,16 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   Settings settings;
   experiment.bind(settings);
   for (const YAML::Node& file : files) settings.read(file, source);
+  experiment.anchorPaths(folder);
   for (const std::string& assignment : overrides) settings.assign(assignment);
+  experiment.anchorPaths("");
 
   ExperimentSettings& e = experiment.settings_;
   requirePlainName("experiment", e.experiment);
   if (!e.run_id.empty()) requirePlainName("run_id", e.run_id);
+  ModelChoice* model = experiment.family_->model();
+  const bool own_model = model != nullptr && !model->file.empty();
+  if (own_model) model->file = absolutePath("environment.model_file", model->file);
   experiment.family_->build(static_cast<std::uint64_t>(e.seed));
   if (e.aggregation.quorum > experiment.numTasks()) {
     throw Error("aggregation.quorum is " + std::to_string(e.aggregation.quorum) +
@@ -305,14 +331,30 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   experiment.checkAggregation();
   experiment.checkStability();
   e.dqn.portable = e.sac.portable = e.sac.context.portable = e.arithmetic == "portable";
+  experiment.checkSampling();
   e.results_dir = expandResultsDir(e.results_dir);
   if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
   if (e.run_id.empty()) {
     e.run_id = utcStamp() + "_" + e.algorithm + "_seed" + std::to_string(e.seed);
   }
-  experiment.yaml_ = settings.yaml();
+  experiment.yaml_ = experiment.run_yaml_ = settings.yaml();
+  if (own_model) {
+    const std::string file = model->file;
+    model->file = std::string(kModels) + "/" + ModelFiles::find(file).names.front();
+    experiment.run_yaml_ = settings.yaml();
+    model->file = file;
+  }
   experiment.table_ = settings.table();
   return experiment;
+}
+
+void Experiment::copyModel() const {
+  if (model() == nullptr || model()->file.empty()) return;
+  const ModelFiles files = ModelFiles::find(model()->file);
+  if (files.hash != model()->hash) {
+    throw Error("the model " + model()->file + " has changed since it was read: start again.");
+  }
+  files.copyTo(runDir() + "/" + kModels);
 }
 
 std::string Experiment::describe(const std::string& environment, const std::string& learner) {
@@ -362,6 +404,13 @@ void Experiment::checkAggregation() const {
     throw Error("aggregation.outlier_factor is " + formatNumber(a.outlier_factor) +
                 " but must be at least 1, or 0 to leave none out.");
   }
+}
+
+void Experiment::checkSampling() const {
+  const DqnSettings& dqn = settings_.dqn;
+  if (settings_.learner != "dqn" || dqn.warm_up_steps >= dqn.n_step) return;
+  throw Error("dqn.warm_up_steps is " + std::to_string(dqn.warm_up_steps) + " but dqn.n_step is " +
+              std::to_string(dqn.n_step) + ": nothing could be sampled; give at least as many.");
 }
 
 void Experiment::checkStability() {
@@ -423,6 +472,26 @@ double Experiment::trim() const {
 }
 
 std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
+  const auto refuse = [&]() -> Error {
+    const auto settings = flatSettings(parseYaml(yaml_, "the settings"));
+    std::vector<std::string> large;
+    for (const char* name : {"buffer_size", "hidden", "num_envs", "batch_size"}) {
+      const auto setting = settings.find(settings_.learner + "." + name);
+      if (setting != settings.end()) large.push_back(setting->first + " = " + setting->second);
+    }
+    return Error("the learner of a task does not fit into this machine's memory: lower " +
+                 join(large) + ".");
+  };
+  try {
+    return makeLearnerUnguarded(task);
+  } catch (const std::bad_alloc&) {
+    throw refuse();
+  } catch (const std::length_error&) {
+    throw refuse();
+  }
+}
+
+std::unique_ptr<PersonalLearner> Experiment::makeLearnerUnguarded(int task) const {
   const ExperimentSettings& e = settings_;
   if (e.learner != "q_learning") {
     ProximalAdamSettings optimizer;

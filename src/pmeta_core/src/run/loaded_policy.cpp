@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <locale>
 #include <optional>
 #include <sstream>
@@ -33,6 +34,30 @@ int numberOf(const PolicyFile& file, const std::string& path, const std::string&
                 " that is no whole number from 0 to " + std::to_string(limit) + ".");
   }
   return value;
+}
+
+// A model that is not shipped is the copy in the run's folder, or, of a policy that is elsewhere,
+// the file that was copied; its hash says whether it is the right one.
+Experiment experimentOf(const PolicyFile& file, const std::string& path) {
+  namespace fs = std::filesystem;
+  const std::string source = "the policy file " + path;
+  const std::string& settings = textOf(file, path, "settings");
+  const fs::path run = fs::absolute(path).lexically_normal().parent_path().parent_path();
+  const auto original = file.metadata.find("model_file");
+  const YAML::Node environment = parseYaml(settings, source)["environment"];
+  if (original == file.metadata.end() || !environment || !environment["model_file"]) {
+    return Experiment::parse(settings, source, {}, run.string());
+  }
+  const fs::path copy = run / environment["model_file"].as<std::string>();
+  if (fs::exists(copy)) return Experiment::parse(settings, source, {}, run.string());
+  if (!fs::exists(original->second)) {
+    throw Error(source + " needs its model, which is neither " + copy.string() + " nor " +
+                original->second + ": leave the policy in the folder of its run.");
+  }
+  YAML::Emitter value;
+  value << YAML::DoubleQuoted << original->second;
+  return Experiment::parse(settings, source,
+                           {std::string("environment.model_file:=") + value.c_str()});
 }
 
 }  // namespace
@@ -100,8 +125,7 @@ LoadedPolicy::LoadedPolicy(const std::string& path, int as_task)
     : LoadedPolicy(path, loadPolicy(path), as_task) {}
 
 LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file, int as_task)
-    : experiment_(Experiment::parse(textOf(file, path, "settings"), "the policy file " + path)),
-      model_(std::move(file.model)) {
+    : experiment_(experimentOf(file, path)), model_(std::move(file.model)) {
   round_ = numberOf(file, path, "round", experiment_.settings().rounds);
   const std::string& policy = textOf(file, path, "policy");
   if (policy == name(Policy::kPersonal)) {

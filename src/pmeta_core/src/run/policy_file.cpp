@@ -289,7 +289,11 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment, 
       {"run_id", settings.run_id},
       {"observation_size", std::to_string(spec.observation_size)},
       {"num_actions", std::to_string(spec.num_actions)},
-      {"settings", experiment.yaml()}};
+      {"settings", experiment.runYaml()}};
+  if (const ModelChoice* model = experiment.model()) {
+    metadata["model_hash"] = model->hash;
+    if (!model->file.empty()) metadata["model_file"] = model->file;
+  }
   if (policy == Policy::kPersonal) metadata["task"] = std::to_string(task);
   if (!task_input.empty()) {
     std::vector<std::string> numbers;

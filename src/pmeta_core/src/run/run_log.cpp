@@ -44,6 +44,7 @@ std::string constantManifest(const Experiment& experiment, const std::string& st
   manifest["host"] = hostName();
   manifest["pid"] = ::getpid();
   manifest["settings_hash"] = experiment.settingsHash();
+  if (experiment.model() != nullptr) manifest["model_hash"] = experiment.model()->hash;
   manifest["commit"] = commit();
   manifest["versions"] = versions();
   manifest["machine"] = machine();
@@ -153,7 +154,8 @@ RunLog::RunLog(const Experiment& experiment, const std::string& started, int rou
 
 RunLog RunLog::create(const Experiment& experiment, RunLock lock) {
   RunLog log(experiment, utcTime(), 0, std::move(lock));
-  writeFileAtomically(log.dir_ + "/config.yaml", experiment.yaml());
+  experiment.copyModel();
+  writeFileAtomically(log.dir_ + "/config.yaml", experiment.runYaml());
   log.writeManifest("running");
   writeFileAtomically(log.dir_ + "/rounds.csv", std::string(csvHeader()) + "\n");
   log.openCsv();

@@ -1,5 +1,6 @@
 // What runs a sweep consists of: values, combinations, and a folder name for each.
 #include <charconv>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <regex>
@@ -110,7 +111,10 @@ std::string plainName(const Experiment& experiment, const std::vector<Axis>& axe
     for (const auto& [key, value] : values) {
       const std::string last = key.substr(key.rfind('.') + 1);
       if (key != axis.key && last != axis.key) continue;
-      name += (name.empty() ? "" : "-") + last + "_" + value;
+      // of a path the file's name will do
+      const bool is_path = key == "environment.model_file";
+      name += (name.empty() ? "" : "-") + last + "_" +
+              (is_path ? std::filesystem::path(value).filename().string() : value);
     }
   }
   static const std::regex kUnfit("[^A-Za-z0-9_.+-]+");

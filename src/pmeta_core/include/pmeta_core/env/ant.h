@@ -65,6 +65,7 @@ class AntFwdBackFamily : public EnvFamily {
   void build(std::uint64_t seed) override;
   int numTasks() const override { return static_cast<int>(angles_.size()); }
   int numTestTasks() const override { return static_cast<int>(test_angles_.size()); }
+  ModelChoice* model() override { return &mujoco_.model; }
   std::string taskName(int task) const override;
   std::string taskDescription(int task) const override;
   std::unique_ptr<Env> make(int task) const override;

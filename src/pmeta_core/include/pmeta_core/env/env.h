@@ -82,6 +82,12 @@ class Env {
 /// Env::setState.
 void requireState(const EnvSpec& spec, const std::vector<double>& state, std::size_t size);
 
+/// Which model of a physics engine a family simulates.
+struct ModelChoice {
+  std::string file;  ///< "" for the shipped one
+  std::string hash;  ///< of that model, or "" for any; set by EnvFamily::build()
+};
+
 /// A family of MDPs, the tasks of one experiment: its settings, and the tasks that follow from
 /// them.
 class EnvFamily {
@@ -93,6 +99,9 @@ class EnvFamily {
 
   /// Draws and checks the tasks; to be called once, after reading and before anything below.
   virtual void build(std::uint64_t seed) = 0;
+
+  /// Its model; nullptr if it has none.
+  virtual ModelChoice* model() { return nullptr; }
 
   /// Tasks 0 to numTasks() - 1 are for training.
   virtual int numTasks() const = 0;

@@ -53,10 +53,14 @@ class MujocoEnv : public Env {
 
 /// Settings of the families of such environments.
 struct MujocoSettings {
-  std::string model_file;  ///< "" for the shipped model
+  ModelChoice model;
   int horizon = 200;
 
   void bind(Settings& settings);
+
+  /// The chosen model, whose hash is then known. Throws Error if it is not of the hash that the
+  /// settings give; see also MujocoModel::require().
+  std::shared_ptr<const MujocoModel> open(const MujocoLayout& layout);
 };
 
 }  // namespace pmeta

@@ -73,6 +73,7 @@ class Walker2dParamsFamily : public EnvFamily {
   void build(std::uint64_t seed) override;
   int numTasks() const override { return num_train_; }
   int numTestTasks() const override { return static_cast<int>(tasks_.size()) - num_train_; }
+  ModelChoice* model() override { return &mujoco_.model; }
   std::string taskName(int task) const override;
   std::string taskDescription(int task) const override;
   std::unique_ptr<Env> make(int task) const override;

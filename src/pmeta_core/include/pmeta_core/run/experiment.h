@@ -81,9 +81,12 @@ class Experiment {
   /// Reads a settings file and applies "key:=value" overrides. Throws Error.
   static Experiment load(const std::string& path, const std::vector<std::string>& overrides = {});
 
-  /// The same from YAML text; `source` names it in errors.
+  /// The same from YAML text; `source` names it in errors. Paths in a settings file are relative to
+  /// the file's folder, those in a text to `folder`, or to the working folder if it is "", as
+  /// those of overrides are.
   static Experiment parse(const std::string& text, const std::string& source,
-                          const std::vector<std::string>& overrides = {});
+                          const std::vector<std::string>& overrides = {},
+                          const std::string& folder = "");
 
   /// The experiment of a run folder, by its config.yaml; the folder may have been moved.
   /// `overrides` may set what does not define the run (see definingSettings()). Throws Error if
@@ -117,6 +120,7 @@ class Experiment {
   /// inference network.
   std::vector<int> contextEpisodes() const;
 
+  /// Throws Error, which names the settings, if it does not fit into memory.
   std::unique_ptr<PersonalLearner> makeLearner(int task) const;
 
   /// The best return any policy can have on the task, where it can be computed (tabular tasks).
@@ -133,10 +137,17 @@ class Experiment {
 
   /// The effective settings as YAML; parse() of it gives the same experiment.
   const std::string& yaml() const { return yaml_; }
+  /// The same for a file in the run's folder, which names the copy of the model there.
+  const std::string& runYaml() const { return run_yaml_; }
+  /// The model that is simulated; nullptr if there is none.
+  const ModelChoice* model() const { return family_->model(); }
+  /// Copies a model that is not shipped into the run's folder, where runYaml() names it.
+  void copyModel() const;
   /// The same as a table for people.
   const std::string& table() const { return table_; }
   /// Those of the effective settings that decide what a run learns, by full key: all but
-  /// results_dir, checkpoint.*, pace, publish_trajectories and aggregation.round_timeout.
+  /// results_dir, checkpoint.*, pace, publish_trajectories, aggregation.round_timeout and key_file,
+  /// and of a model the hash, not where it is.
   std::map<std::string, std::string> definingSettings() const { return definingSettings(yaml_); }
   /// The same of effective settings as YAML, e.g. those of a run folder's config.yaml.
   static std::map<std::string, std::string> definingSettings(const std::string& yaml);
@@ -156,7 +167,10 @@ class Experiment {
 
   Experiment() = default;
   static Experiment build(const YAML::Node& root, const std::string& source,
-                          const std::vector<std::string>& overrides);
+                          const std::vector<std::string>& overrides, const std::string& folder);
+  void anchorPaths(const std::string& folder);
+  std::unique_ptr<PersonalLearner> makeLearnerUnguarded(int task) const;
+  void checkSampling() const;
   void bind(Settings& settings);
   void bindLearner(Settings& settings);
   void applyAlgorithm();
@@ -167,6 +181,7 @@ class Experiment {
   std::shared_ptr<EnvFamily> family_;
   std::shared_ptr<Optima> optima_ = std::make_shared<Optima>();
   std::string yaml_;
+  std::string run_yaml_;
   std::string table_;
   std::vector<std::string> notes_;
 };

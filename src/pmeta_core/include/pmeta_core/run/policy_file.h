@@ -34,8 +34,9 @@ PolicyFile loadPolicy(const std::string& path);
 
 /// What a loader needs to rebuild and use a policy: "environment", "learner", "policy" (personal or
 /// meta), "task" (of a personal policy), "round", "run_id", "observation_size", "num_actions",
-/// "task_input" (numbers with commas between, if there are any) and "settings", the effective
-/// settings as YAML.
+/// "task_input" (numbers with commas between, if there are any), "model_hash" and "model_file" (of
+/// a physical model, and where it was; none if it is shipped) and "settings", the effective
+/// settings as YAML, whose model_file is the run folder's copy.
 std::map<std::string, std::string> policyMetadata(const Experiment& experiment, Policy policy,
                                                   int task, int round,
                                                   const std::vector<float>& task_input = {});

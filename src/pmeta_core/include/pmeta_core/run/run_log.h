@@ -89,7 +89,8 @@ class RoundBook {
 };
 
 /// The files of a run: config.yaml, manifest.json and rounds.csv in
-/// <results_dir>/<experiment>/<run_id>, which nobody else can write as long as this lives.
+/// <results_dir>/<experiment>/<run_id>, which nobody else can write until it is finished or fails.
+/// A model that is not shipped is copied there too.
 class RunLog {
  public:
   /// Creates the folder; throws Error if it holds a run already or cannot be written.
