@@ -475,7 +475,7 @@ TEST(Settings, TableMarksDefaultsAndAlignsValues) {
   EXPECT_EQ(settings.table(), "  group.rate  0.1  (default)\n  word        y\n");
   EXPECT_EQ(settings.table(true),
             "  group.rate  0.1  (default)\n              the step [a number, above 0]\n"
-            "  word        y\n              a word [text]\n");
+            "  word        y  (default: x)\n              a word [text]\n");
 }
 
 TEST(FormatNumber, ReadsBackExactly) {

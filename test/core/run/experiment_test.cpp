@@ -314,12 +314,23 @@ TEST(Experiment, LearnersOfAllTasksShareOneLayout) {
   }
 }
 
-TEST(Experiment, DescribeListsEveryKeyWithItsMeaning) {
-  const std::string text = Experiment::describe("gridworld", "q_learning");
-  for (const std::string word :
-       {"personal.lambda", "strength of the pull", "environment.landmark", "aggregation.beta"}) {
-    EXPECT_NE(text.find(word), std::string::npos) << word;
+TEST(Experiment, DescribesEverySettingWithItsValueAndDefault) {
+  const std::string text = gridExperiment({"lambda:=5", "landmark:=centre"}).describe();
+  for (const std::string part :
+       {"personal.lambda                 5  (default: 10)\n", "strength of the pull",
+        "environment.landmark            centre  (default: corner)\n", "aggregation.beta"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
+}
+
+TEST(Experiment, AnotherLearnerIsNoDefault) {
+  const Experiment e = Experiment::parse(
+      "experiment: cart\nlearner: dqn\nenvironment: {name: cart_pole}\n", "the test");
+  const std::string text = e.describe();
+  EXPECT_NE(text.find("dqn  (default: q_learning)\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("cart_pole  (default: gridworld)\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("  dqn.batch_size "), std::string::npos) << text;
+  EXPECT_EQ(text.find("q_learning.updates"), std::string::npos) << text;
 }
 
 TEST(ResultsDir, DefaultsToRosHomeThenHome) {

@@ -378,8 +378,13 @@ std::string Settings::table(bool with_docs) const {
   std::ostringstream out;
   for (const Entry& entry : entries_) {
     const std::string text = entry.text();
-    out << "  " << entry.key << std::string(key_width - entry.key.size() + 2, ' ') << text
-        << (text == entry.initial ? "  (default)" : "") << "\n";
+    out << "  " << entry.key << std::string(key_width - entry.key.size() + 2, ' ') << text;
+    if (text == entry.initial) {
+      out << "  (default)";
+    } else if (with_docs) {
+      out << "  (default: " << entry.initial << ")";
+    }
+    out << "\n";
     if (with_docs) {
       out << "  " << std::string(key_width + 2, ' ') << entry.doc << " [" << entry.allowed << "]\n";
     }

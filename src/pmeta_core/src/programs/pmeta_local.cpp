@@ -16,8 +16,8 @@
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/process.h"
+#include "pmeta_core/base/settings.h"
 #include "pmeta_core/env/model_check.h"
-#include "pmeta_core/env/tabular_env.h"
 #include "pmeta_core/env/trajectory_check.h"
 #include "pmeta_core/run/authentication.h"
 #include "pmeta_core/run/console.h"
@@ -51,7 +51,7 @@ constexpr char kUsage[] =
   convergence CONFIG [key:=value ...]  measure the theory's statements on known models
   check CONFIG [key:=value ...]        check the settings and print the effective ones as YAML
   key FILE                             make a key for key_file:=FILE; never overwrites
-  settings [ENVIRONMENT]               list every setting with its meaning
+  settings CONFIG [key:=value ...]     list every setting: its value, the default and its meaning
   replay KIND FILE [--tasks FILE]      simulate recorded trajectories (CSV, also gzip) again and
                                        compare. KIND: ant, cartpole, half_cheetah, mountaincar,
                                        sparse_point, walker2d, walker2d_params. sparse_point and
@@ -272,15 +272,12 @@ int check(Arguments arguments) {
   return 0;
 }
 
-int settings(const Arguments& arguments) {
-  const std::string environment = arguments.words.empty() ? "gridworld" : arguments.words[0];
-  const auto family = pmeta::makeEnvFamily(environment);
-  family->build(0);
-  const auto env = family->make(0);
-  const bool tabular = dynamic_cast<const pmeta::TabularEnv*>(env.get()) != nullptr;
-  const bool discrete = env->spec().num_actions > 0;
-  const std::string learner = tabular ? "q_learning" : (discrete ? "dqn" : "sac");
-  std::cout << Experiment::describe(environment, learner);
+int settings(Arguments arguments) {
+  const std::string config = takeConfig(arguments);
+  const YAML::Node name = pmeta::loadYamlFile(config)["experiment"];
+  const bool theory = name && name.IsScalar() && name.Scalar() == "convergence";
+  std::cout << (theory ? pmeta::describeConvergence(pmeta::loadConvergence(config, arguments.words))
+                       : Experiment::load(config, arguments.words).describe());
   return 0;
 }
 

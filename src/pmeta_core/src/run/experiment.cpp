@@ -186,7 +186,7 @@ std::string firstDifference(const std::map<std::string, std::string>& a,
   return "";
 }
 
-void Experiment::bind(Settings& s) {
+void Experiment::bind(Settings& s, const std::string& learner) {
   ExperimentSettings& e = settings_;
   s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
   s.bind("preset", e.preset, "variant of the settings file; \"\" for none");
@@ -234,7 +234,7 @@ void Experiment::bind(Settings& s) {
   s.bind("personal.personal_init", e.personal.personal_init,
          "personal parameters at a round's start: the meta-policy's, or kept", {"meta", "keep"});
 
-  bindLearner(s);
+  bindLearner(s, learner);
 
   s.bind("aggregation.beta", e.aggregation.beta, "mixing: meta <- (1 - beta) meta + beta mean",
          Range::between(0, 1));
@@ -267,15 +267,15 @@ void Experiment::bind(Settings& s) {
   family_->bind(s);
 }
 
-void Experiment::bindLearner(Settings& s) {
+void Experiment::bindLearner(Settings& s, const std::string& learner) {
   ExperimentSettings& e = settings_;
-  if (e.learner == "q_learning") return pmeta::bind(s, "q_learning.", e.q_learning);
+  if (learner == "q_learning") return pmeta::bind(s, "q_learning.", e.q_learning);
   s.bind("personal.learning_rate", e.personal.learning_rate, "Adam's learning rate",
          Range::above(0));
   s.bind("personal.proximal", e.personal.proximal,
          "the pull after Adam's step, or in the gradient that Adam gets", {"decoupled", "coupled"});
-  if (e.learner == "dqn") pmeta::bind(s, "dqn.", e.dqn);
-  if (e.learner != "sac") return;
+  if (learner == "dqn") pmeta::bind(s, "dqn.", e.dqn);
+  if (learner != "sac") return;
   const Range own = Range::atLeast(-1);
   s.bind("personal.lambda_actor", e.personal.lambda_actor,
          "the actor's own strength; -1: lambda; 0: the actor is neither reset nor shared", own);
@@ -299,13 +299,13 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
                              const std::vector<std::string>& overrides, const std::string& folder) {
   const std::vector<YAML::Node> files = choosePreset(root, source, overrides);
   Experiment experiment;
-  experiment.settings_.learner =
+  const std::string learner =
       peek(files, overrides, "", "learner", experiment.settings_.learner);
   experiment.family_ = makeEnvFamily(
       peek(files, overrides, "environment", "name", experiment.settings_.environment));
 
   Settings settings;
-  experiment.bind(settings);
+  experiment.bind(settings, learner);
   for (const YAML::Node& file : files) settings.read(file, source);
   experiment.anchorPaths(folder);
   for (const std::string& assignment : overrides) settings.assign(assignment);
@@ -357,12 +357,12 @@ void Experiment::copyModel() const {
   files.copyTo(runDir() + "/" + kModels);
 }
 
-std::string Experiment::describe(const std::string& environment, const std::string& learner) {
-  Experiment experiment;
-  experiment.settings_.learner = learner;
-  experiment.family_ = makeEnvFamily(environment);
+std::string Experiment::describe() const {
+  Experiment defaults;
+  defaults.family_ = makeEnvFamily(settings_.environment);
   Settings settings;
-  experiment.bind(settings);
+  defaults.bind(settings, settings_.learner);
+  settings.read(parseYaml(yaml_, "the settings"), "the settings");
   return settings.table(true);
 }
 

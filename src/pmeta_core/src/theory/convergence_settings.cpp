@@ -120,10 +120,11 @@ std::string convergenceYaml(const ConvergenceSettings& settings) {
   return bound.yaml();
 }
 
-std::string describeConvergence() {
+std::string describeConvergence(const ConvergenceSettings& settings) {
   ConvergenceSettings defaults;
   Settings bound;
   bindAll(bound, defaults);
+  bound.read(parseYaml(convergenceYaml(settings), "the settings"), "the settings");
   return bound.table(true);
 }
 

@@ -153,8 +153,8 @@ class Experiment {
   static std::map<std::string, std::string> definingSettings(const std::string& yaml);
   /// A hash of those, as text: parties of one run have the same.
   std::string settingsHash() const;
-  /// All keys with meanings, for --help.
-  static std::string describe(const std::string& environment, const std::string& learner);
+  /// Every setting for people: its value, the default where that is another, and its meaning.
+  std::string describe() const;
   /// Notes and warnings about the settings, one sentence each.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -171,8 +171,8 @@ class Experiment {
   void anchorPaths(const std::string& folder);
   std::unique_ptr<PersonalLearner> makeLearnerUnguarded(int task) const;
   void checkSampling() const;
-  void bind(Settings& settings);
-  void bindLearner(Settings& settings);
+  void bind(Settings& settings, const std::string& learner);
+  void bindLearner(Settings& settings, const std::string& learner);
   void applyAlgorithm();
   void checkAggregation() const;
   void checkStability();

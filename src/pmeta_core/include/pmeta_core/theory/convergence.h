@@ -58,8 +58,8 @@ ConvergenceSettings parseConvergence(const std::string& text, const std::string&
 /// All settings as YAML; parseConvergence() of it gives the same settings.
 std::string convergenceYaml(const ConvergenceSettings& settings);
 
-/// All keys with meanings, for --help.
-std::string describeConvergence();
+/// Every setting for people: its value, the default where that is another, and its meaning.
+std::string describeConvergence(const ConvergenceSettings& settings);
 
 /// <results_dir>/<experiment>/<run_id>
 std::string convergenceDir(const ConvergenceSettings& settings);
