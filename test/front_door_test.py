@@ -373,16 +373,20 @@ def test_a_sweep_does_each_run_once_and_goes_on_where_it_stopped(tmp_path):
     assert sorted(path.name for path in folder.iterdir()) == names
 
     (folder / names[2] / "manifest.json").unlink()
-    listed = run(command + ["--list"]).stdout.splitlines()
-    assert sorted(listed, key=lambda line: line.split()[1]) == [
+    before = sorted(tmp_path.rglob("*"))
+    planned = run(command + ["--dry-run"])
+    assert planned.stderr.endswith("1 of 9 runs are to be done\n")
+    assert sorted(tmp_path.rglob("*")) == before
+    assert sorted(planned.stdout.splitlines(), key=lambda line: line.split()[1]) == [
         "%s %s" % ("missing" if name == names[2] else "finished", folder / name) for name in names]
 
     # the same name for other settings would mix results
-    other = run([LOCAL, "sweep", CONFIG, "lambda:=5,10", "algorithm:=pmeta,model_averaging",
-                 "seed:=0-2", "rounds:=5", "results_dir:=%s" % tmp_path, "--name", "s"])
-    assert other.returncode == 1
-    assert ("has other settings, with rounds 10 where this sweep has 5: give this sweep another "
-            "--name") in other.stderr
+    for dry in ([], ["--dry-run"]):
+        other = run([LOCAL, "sweep", CONFIG, "lambda:=5,10", "algorithm:=pmeta,model_averaging",
+                     "seed:=0-2", "rounds:=5", "results_dir:=%s" % tmp_path, "--name", "s"] + dry)
+        assert other.returncode == 1
+        assert ("has other settings, with rounds 10 where this sweep has 5: give this sweep another "
+                "--name") in other.stderr
 
 
 def test_an_interrupted_sweep_keeps_what_is_finished(tmp_path):

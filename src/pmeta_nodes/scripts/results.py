@@ -58,7 +58,7 @@ def sweep_words(sweep, results_dir):
 
 def statuses(sweep, results_dir):
     """[(status, folder)] of the runs that the sweep consists of."""
-    done = subprocess.run(sweep_words(sweep, results_dir) + ["--list"], stdout=subprocess.PIPE,
+    done = subprocess.run(sweep_words(sweep, results_dir) + ["--dry-run"], stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE, universal_newlines=True)
     if done.returncode != 0:
         raise PlotError("sweep '%s' of the plan: %s"

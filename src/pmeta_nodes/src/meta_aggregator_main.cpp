@@ -17,9 +17,10 @@ private parameters
   ~await_viewer    round 1 waits for rviz on trajectory_view, 30 s at most (default false)
   ~await_recorder  round 1 waits for rosbag's node `recorder` to hear all, 30 s at most (default false)
   ~config_file  settings file; by default the parameter `config` of the namespace is read
-subscribes   auxiliary, returns
+subscribes   auxiliary, returns, agent_status
 publishes    meta_policy, round, scores (all latched), /diagnostics
 offers       pause (std_srvs/SetBool): true holds the next meta-policy back, false lets the run go on
+             evaluate (std_srvs/Trigger): the next meta-policy is evaluated, whatever the schedule
              save_checkpoint (std_srvs/Trigger): all save one when the next round is done
 Normally started by roslaunch pmeta_nodes gridworld.launch.
 )";

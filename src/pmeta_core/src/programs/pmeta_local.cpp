@@ -40,11 +40,11 @@ constexpr char kUsage[] =
   run CONFIG [key:=value ...]          run an experiment in this process
   run CONFIG resume:=RUN_DIR           go on with a run that was stopped or killed, from its newest
                                        checkpoints and with its own settings
-  sweep CONFIG key:=a,b,c ... [--name NAME] [--jobs N] [--resume] [--list]
+  sweep CONFIG key:=a,b,c ... [--name NAME] [--jobs N] [--resume] [--dry-run]
                                        run it for every combination of values; seed:=0-9 is a range.
                                        Run again to go on where it stopped: with the run that was
                                        cut off, or with --resume within it, from its checkpoints.
-                                       --list tells the status of each run instead.
+                                       --dry-run only lists the runs: status and folder.
                                        A run that fails keeps no other from being run: those are
                                        listed at the end, the exit code is 1, and the same command
                                        tries them again.
@@ -80,7 +80,7 @@ struct Arguments {
   int task = -1;  ///< -1: not given
   int episodes = 100;
   bool resume = false;
-  bool list = false;
+  bool dry_run = false;
   int jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
@@ -110,8 +110,8 @@ Arguments parseArguments(int argc, char** argv) {
       arguments.tasks = value(i);
     } else if (word == "--resume") {
       arguments.resume = true;
-    } else if (word == "--list") {
-      arguments.list = true;
+    } else if (word == "--dry-run") {
+      arguments.dry_run = true;
     } else if (word == "--jobs") {
       arguments.jobs = wholeNumber(word, value(i), 1, 1024);
     } else if (word == "--task") {
@@ -208,6 +208,20 @@ int run(Arguments arguments) {
   return result.stopped ? 130 : 0;
 }
 
+// what a sweep would do; its runs are told a line each, for programs too
+int listSweep(const pmeta::SweepPlan& plan) {
+  const std::vector<Experiment> runs = pmeta::planSweep(plan);
+  int open = 0;
+  for (const Experiment& experiment : runs) {
+    const std::string status = pmeta::runStatus(experiment.runDir());
+    if (status != "finished" && status != "running") ++open;
+    std::cout << (status.empty() ? "missing" : status) << " " << experiment.runDir() << "\n";
+  }
+  std::cout << std::flush;
+  std::cerr << open << " of " << runs.size() << " runs are to be done\n";
+  return 0;
+}
+
 int sweep(Arguments arguments) {
   pmeta::heedStopSignals(kAfterTheRound);
   pmeta::SweepPlan plan;
@@ -217,13 +231,7 @@ int sweep(Arguments arguments) {
   plan.name =
       arguments.name.empty() ? std::filesystem::path(plan.config).stem().string() : arguments.name;
   plan.resume = arguments.resume;
-  if (arguments.list) {
-    for (const Experiment& experiment : pmeta::planSweep(plan)) {
-      const std::string status = pmeta::runStatus(experiment.runDir());
-      std::cout << (status.empty() ? "missing" : status) << " " << experiment.runDir() << "\n";
-    }
-    return 0;
-  }
+  if (arguments.dry_run) return listSweep(plan);
   int found = 0;
   int elsewhere = 0;
   int done = 0;

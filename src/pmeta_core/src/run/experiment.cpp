@@ -299,8 +299,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
                              const std::vector<std::string>& overrides, const std::string& folder) {
   const std::vector<YAML::Node> files = choosePreset(root, source, overrides);
   Experiment experiment;
-  const std::string learner =
-      peek(files, overrides, "", "learner", experiment.settings_.learner);
+  const std::string learner = peek(files, overrides, "", "learner", experiment.settings_.learner);
   experiment.family_ = makeEnvFamily(
       peek(files, overrides, "environment", "name", experiment.settings_.environment));
 

@@ -4,35 +4,15 @@
 #include <exception>
 #include <filesystem>
 #include <limits>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <thread>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/base/file.h"
 #include "pmeta_core/run/local_runner.h"
 
 namespace pmeta {
 namespace {
-
-// throws Error if there is a run of that name that has other settings
-void requireSameSettings(const Experiment& experiment) {
-  const std::string dir = experiment.runDir();
-  const std::string config = dir + "/config.yaml";
-  if (!std::filesystem::exists(config)) return;
-  const auto found = decidingSettings(readFile(config, "the settings file"));
-  const auto expected = decidingSettings(experiment.yaml());
-  const std::string key = firstDifference(found, expected);
-  if (key.empty()) return;
-  const auto shown = [&](const std::map<std::string, std::string>& settings) {
-    const auto value = settings.find(key);
-    return value == settings.end() ? std::string("not set") : value->second;
-  };
-  throw Error("the run " + dir + " has other settings, with " + key + " " + shown(found) +
-              " where this sweep has " + shown(expected) +
-              ": give this sweep another --name, or remove that folder.");
-}
 
 bool isFinished(const Experiment& experiment) {
   return runStatus(experiment.runDir()) == "finished";
@@ -70,7 +50,6 @@ SweepResult runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
   const std::vector<Experiment> runs = planSweep(plan);
   const std::string folder = runs.front().settings().results_dir;
   requireWritable(folder);
-  for (const Experiment& run : runs) requireSameSettings(run);
 
   std::vector<const Experiment*> open;
   SweepProgress progress;

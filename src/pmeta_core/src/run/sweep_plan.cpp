@@ -7,6 +7,7 @@
 #include <set>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/file.h"
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/hash.h"
 #include "pmeta_core/run/sweep.h"
@@ -153,6 +154,23 @@ std::map<std::string, std::string> decidingSettings(const std::string& yaml) {
   return settings;
 }
 
+void requireSameSettings(const Experiment& experiment) {
+  const std::string dir = experiment.runDir();
+  const std::string config = dir + "/config.yaml";
+  if (!std::filesystem::exists(config)) return;
+  const auto found = decidingSettings(readFile(config, "the settings file"));
+  const auto expected = decidingSettings(experiment.yaml());
+  const std::string key = firstDifference(found, expected);
+  if (key.empty()) return;
+  const auto shown = [&](const std::map<std::string, std::string>& settings) {
+    const auto value = settings.find(key);
+    return value == settings.end() ? std::string("not set") : value->second;
+  };
+  throw Error("the run " + dir + " has other settings, with " + key + " " + shown(found) +
+              " where this sweep has " + shown(expected) +
+              ": give this sweep another --name, or remove that folder.");
+}
+
 std::vector<Experiment> planSweep(const SweepPlan& plan) {
   requirePlainName("the sweep's name", plan.name);
   const std::vector<Axis> axes = parseAxes(plan.assignments);
@@ -173,6 +191,7 @@ std::vector<Experiment> planSweep(const SweepPlan& plan) {
     placed.push_back("run_id:=" + names[i]);
     if (!plan.resume) placed.push_back("checkpoint.interval:=0");
     runs.push_back(Experiment::load(plan.config, placed));
+    requireSameSettings(runs.back());
   }
   return runs;
 }

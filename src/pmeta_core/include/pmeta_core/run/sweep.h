@@ -39,6 +39,10 @@ struct SweepProgress {
 /// Of effective settings as YAML, those that decide a run's numbers: Experiment::definingSettings()
 /// without the run's name.
 std::map<std::string, std::string> decidingSettings(const std::string& yaml);
+
+/// Throws Error if the run's folder holds a run whose deciding settings are others.
+void requireSameSettings(const Experiment& experiment);
+
 /// A run of a sweep that ended with an error.
 struct SweepFailure {
   std::string run_id;
@@ -52,14 +56,14 @@ struct SweepResult {
 };
 
 /// The runs of a plan, checked, each once: combinations with equal effective settings (an algorithm
-/// may fix some) are one run. Throws Error before anything is run.
+/// may fix some) are one run. Throws Error before anything is run, also if a run has other settings
+/// under the same name.
 std::vector<Experiment> planSweep(const SweepPlan& plan);
 
 /// Runs what is not finished yet, `plan.jobs` at a time; what somebody else writes is left alone. A
 /// run that fails keeps no other from being run: its manifest says "failed" and why, and the next
 /// sweep of the plan tries it again. Stops early, keeping what is finished, when `stop` becomes
-/// true. Calls on_progress from one thread at a time. Throws Error, before anything there is
-/// touched, if a run has other settings under the same name.
+/// true. Calls on_progress from one thread at a time.
 SweepResult runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
                      const std::function<void(const SweepProgress&)>& on_progress);
 
