@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/experiment/experiment.h"
 
 namespace pmeta::test {
 

@@ -9,7 +9,7 @@
 #include "../core/memory_state.h"
 #include "../core/run/checkpoint_experiments.h"
 #include "fuzz_support.h"
-#include "pmeta_core/run/checkpoint.h"
+#include "pmeta_core/storage/checkpoint.h"
 #include "pmeta_core/run/meta_aggregator.h"
 #include "pmeta_core/run/task_agent.h"
 #include "targets.h"

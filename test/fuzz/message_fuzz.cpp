@@ -8,7 +8,7 @@
 #include <memory>
 #include <new>
 
-#include "conversions.h"
+#include "common/conversions.h"
 #include "fuzz_support.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/run/meta_aggregator.h"

@@ -1,8 +1,8 @@
 #include "fuzz_support.h"
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/env/model_check.h"
-#include "pmeta_core/env/trajectory_check.h"
-#include "pmeta_core/env/trajectory_simulator.h"
+#include "pmeta_core/verify/model_check.h"
+#include "pmeta_core/verify/trajectory_check.h"
+#include "pmeta_core/verify/trajectory_simulator.h"
 #include "targets.h"
 
 namespace pmeta::fuzz {

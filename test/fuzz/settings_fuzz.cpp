@@ -2,7 +2,7 @@
 
 #include "fuzz_support.h"
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/experiment/experiment.h"
 #include "targets.h"
 
 namespace pmeta::fuzz {

@@ -1,4 +1,4 @@
-#include "cart_pole_scene.h"
+#include "view/cart_pole_scene.h"
 
 #include <gtest/gtest.h>
 

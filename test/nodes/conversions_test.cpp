@@ -1,4 +1,4 @@
-#include "conversions.h"
+#include "common/conversions.h"
 
 #include <gtest/gtest.h>
 #include <ros/serialization.h>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <thread>
 
-#include "mailbox.h"
+#include "common/mailbox.h"
 #include "pmeta_core/base/error.h"
 
 namespace pmeta_nodes {
@@ -91,7 +91,7 @@ TEST(Conversions, AuxiliaryUpdateRoundTrip) {
 }
 
 TEST(Conversions, TaskReturnRoundTrip) {
-  for (const auto policy : {pmeta::Policy::kPersonal, pmeta::Policy::kMeta}) {
+  for (const auto policy : {pmeta::PolicyKind::kPersonal, pmeta::PolicyKind::kMeta}) {
     for (const auto split : {pmeta::Split::kTrain, pmeta::Split::kTest}) {
       pmeta::TaskReturn result;
       result.run_id = "run";
@@ -106,7 +106,7 @@ TEST(Conversions, TaskReturnRoundTrip) {
       result.updates = 30;
       result.broken_episodes = 3;
       result.seconds = 0.125;
-      result.scheduled = policy == pmeta::Policy::kMeta;
+      result.scheduled = policy == pmeta::PolicyKind::kMeta;
       const pmeta_msgs::TaskReturn msg = overTheWire(toMsg(result, "grid_4x4"));
       EXPECT_EQ(msg.task_name, "grid_4x4");
       EXPECT_EQ(msg.policy_name, pmeta::name(policy));
@@ -145,7 +145,7 @@ TEST(Conversions, TrajectoriesCarryTheEpisodeAndItsTask) {
   episode.action_grid = 2;
   episode.action_values = {0.1f, 0.2f, -3, 4};
   const pmeta_msgs::Trajectory msg =
-      overTheWire(toMsg(episode, experiment, 1, 4, pmeta::Policy::kMeta));
+      overTheWire(toMsg(episode, experiment, 1, 4, pmeta::PolicyKind::kMeta));
   EXPECT_EQ(msg.run_id, "r");
   EXPECT_EQ(msg.task, 1u);
   EXPECT_EQ(msg.task_name, "grid_5x5");
@@ -260,11 +260,11 @@ TEST(Conversions, ScoresHaveThePoliciesByTaskAndWhatIsNotThereIsNan) {
   round.summary.round = 3;
   round.summary.rounds = 10;
   round.summary.personal_return = -2;
-  for (const auto policy : {pmeta::Policy::kPersonal, pmeta::Policy::kMeta}) {
+  for (const auto policy : {pmeta::PolicyKind::kPersonal, pmeta::PolicyKind::kMeta}) {
     pmeta::RoundRow row;
-    row.result.task = policy == pmeta::Policy::kPersonal ? 1 : 2;
+    row.result.task = policy == pmeta::PolicyKind::kPersonal ? 1 : 2;
     row.result.policy = policy;
-    row.result.mean = policy == pmeta::Policy::kPersonal ? -2 : -7;
+    row.result.mean = policy == pmeta::PolicyKind::kPersonal ? -2 : -7;
     round.rows.push_back(row);
   }
   const pmeta_msgs::Scores msg = overTheWire(toScores(round, experiment));

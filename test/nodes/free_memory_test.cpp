@@ -1,4 +1,4 @@
-#include "free_memory.h"
+#include "common/free_memory.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

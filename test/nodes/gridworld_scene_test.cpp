@@ -1,5 +1,5 @@
-#include "gridworld_scene.h"
-#include "scene_parts.h"
+#include "view/gridworld_scene.h"
+#include "draw/scene_parts.h"
 
 #include <gtest/gtest.h>
 #include <boost/make_shared.hpp>

@@ -1,4 +1,4 @@
-#include "launch_words.h"
+#include "launch/launch_words.h"
 
 #include <gtest/gtest.h>
 

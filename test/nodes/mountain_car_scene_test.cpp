@@ -1,4 +1,4 @@
-#include "mountain_car_scene.h"
+#include "view/mountain_car_scene.h"
 
 #include <gtest/gtest.h>
 

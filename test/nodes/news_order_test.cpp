@@ -1,4 +1,4 @@
-#include "news_order.h"
+#include "common/news_order.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "playback.h"
+#include "view/playback.h"
 
 #include <gtest/gtest.h>
 
-#include "card.h"
+#include "draw/card.h"
 #include "scene_support.h"
 
 namespace pmeta_nodes {

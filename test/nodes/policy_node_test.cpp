@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "pmeta_core/run/policy_file.h"
+#include "pmeta_core/storage/policy_file.h"
 #include "run_over_ros.h"
 
 extern char** environ;

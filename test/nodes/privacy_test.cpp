@@ -11,8 +11,8 @@
 #include <set>
 #include <unordered_set>
 
-#include "conversions.h"
-#include "node_main.h"
+#include "common/conversions.h"
+#include "common/run_node.h"
 #include "pmeta_core/base/format.h"
 #include "recorder.h"
 

@@ -1,4 +1,4 @@
-#include "private_param.h"
+#include "common/private_param.h"
 
 #include <gtest/gtest.h>
 #include <ros/ros.h>

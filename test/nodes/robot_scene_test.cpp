@@ -1,4 +1,4 @@
-#include "robot_scene.h"
+#include "view/robot_scene.h"
 
 #include <gtest/gtest.h>
 

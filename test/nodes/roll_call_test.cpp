@@ -1,4 +1,4 @@
-#include "roll_call.h"
+#include "aggregator/roll_call.h"
 
 #include <gtest/gtest.h>
 

@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "conversions.h"
-#include "node_main.h"
+#include "common/conversions.h"
+#include "common/run_node.h"
 #include "pmeta_core/run/local_runner.h"
 
 namespace pmeta_nodes {

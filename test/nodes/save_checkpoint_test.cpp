@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "pmeta_core/run/checkpoint.h"
+#include "pmeta_core/storage/checkpoint.h"
 #include "run_over_ros.h"
 
 namespace pmeta_nodes {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pmeta_core/base/settings.h"
-#include "scene.h"
+#include "view/scene.h"
 
 namespace pmeta_nodes {
 namespace test {

@@ -1,4 +1,4 @@
-#include "sparse_point_scene.h"
+#include "view/sparse_point_scene.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-"""Policies that a run left in policies/*.safetensors (format: pmeta_core/run/policy_file.h)."""
+"""Policies that a run left in policies/*.safetensors (format: pmeta_core/storage/policy_file.h)."""
 
 import json
 import os

@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "../support.h"
-#include "pmeta_core/env/trajectory_check.h"
+#include "pmeta_core/verify/trajectory_check.h"
 #include "recorded_file.h"
 
 namespace pmeta {

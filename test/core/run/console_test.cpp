@@ -26,13 +26,13 @@ RoundBook::Round roundOf(int round, double personal, double meta, double seconds
   done.summary.test_return = std::numeric_limits<double>::quiet_NaN();
   done.summary.seconds = seconds;
   done.summary.eta_seconds = 65;
-  for (const Policy policy : {Policy::kPersonal, Policy::kMeta}) {
+  for (const PolicyKind policy : {PolicyKind::kPersonal, PolicyKind::kMeta}) {
     for (int task = 0; task < 2; ++task) {
       RoundRow row;
       row.result.round = round;
       row.result.task = task;
       row.result.policy = policy;
-      row.result.mean = (policy == Policy::kPersonal ? personal : meta) + (task == 0 ? -1 : 1);
+      row.result.mean = (policy == PolicyKind::kPersonal ? personal : meta) + (task == 0 ? -1 : 1);
       row.env_steps = row.result.env_steps = 100 * round;
       done.rows.push_back(row);
     }

@@ -20,16 +20,16 @@ Experiment deep(const std::vector<std::string>& overrides) {
 
 TEST(FreshEvaluation, GivesEveryKeptPolicyOnItsTasks) {
   const LocalResult result = runLocally(deep({}));
-  std::map<std::pair<std::string, Policy>, int> rows;
+  std::map<std::pair<std::string, PolicyKind>, int> rows;
   for (const FreshReturn& row : result.fresh) {
     ++rows[{row.snapshot, row.policy}];
     EXPECT_GE(row.stats.episodes, 25);
     EXPECT_GE(row.stats.mean, 1);
     EXPECT_LE(row.stats.mean, 200);
-    if (row.policy == Policy::kPersonal) {
+    if (row.policy == PolicyKind::kPersonal) {
       EXPECT_EQ(row.trained_task, row.task);
     }
-    if (row.policy == Policy::kMeta) {
+    if (row.policy == PolicyKind::kMeta) {
       EXPECT_EQ(row.trained_task, -1);
     }
     if (row.snapshot == "last") {
@@ -51,7 +51,7 @@ TEST(FreshEvaluation, TheBestRoundIsTheOneOfTheHighestMean) {
     }
   }
   for (const FreshReturn& row : result.fresh) {
-    if (row.snapshot == "best" && row.policy == Policy::kPersonal) {
+    if (row.snapshot == "best" && row.policy == PolicyKind::kPersonal) {
       EXPECT_EQ(row.round, best);
     }
   }
@@ -62,7 +62,7 @@ TEST(FreshEvaluation, OwnBestIsEachTasksBestRound) {
   std::map<int, std::pair<double, int>> best;
   for (const auto& round : result.rounds) {
     for (const RoundRow& row : round.rows) {
-      if (row.result.policy != Policy::kPersonal) continue;
+      if (row.result.policy != PolicyKind::kPersonal) continue;
       auto& entry = best.emplace(row.result.task, std::make_pair(-1.0, 0)).first->second;
       if (row.result.mean > entry.first) entry = {row.result.mean, row.result.round};
     }
@@ -80,7 +80,7 @@ TEST(FreshEvaluation, OwnBestIsEachTasksBestRound) {
 TEST(FreshEvaluation, IndependentPoliciesAreCrossedAndHaveNoMeta) {
   const LocalResult result = runLocally(deep({"algorithm:=independent"}));
   EXPECT_EQ(result.fresh.size(), 2u * 2 * 2 + 2);
-  for (const FreshReturn& row : result.fresh) EXPECT_EQ(row.policy, Policy::kPersonal);
+  for (const FreshReturn& row : result.fresh) EXPECT_EQ(row.policy, PolicyKind::kPersonal);
 }
 
 TEST(FreshEvaluation, ChangesNothingOfTheRun) {
@@ -96,17 +96,17 @@ TEST(FreshEvaluation, FreshEpisodesAreNotThoseOfTheRounds) {
   const MetaAggregator aggregator(experiment);
   const Model& policy = aggregator.metaPolicy().model;
   // ten starts against a hundred others: equal means would be a coincidence
-  EXPECT_NE(agent.evaluateFresh(Policy::kPersonal, policy, 100).mean,
+  EXPECT_NE(agent.evaluateFresh(PolicyKind::kPersonal, policy, 100).mean,
             agent.evaluateMeta(aggregator.metaPolicy()).front().mean);
-  EXPECT_EQ(agent.evaluateFresh(Policy::kPersonal, policy, 100).episodes, 100);
-  EXPECT_EQ(agent.evaluateFresh(Policy::kPersonal, policy, 100).mean,
-            agent.evaluateFresh(Policy::kPersonal, policy, 100).mean);
+  EXPECT_EQ(agent.evaluateFresh(PolicyKind::kPersonal, policy, 100).episodes, 100);
+  EXPECT_EQ(agent.evaluateFresh(PolicyKind::kPersonal, policy, 100).mean,
+            agent.evaluateFresh(PolicyKind::kPersonal, policy, 100).mean);
 }
 
 TEST(FreshEvaluation, WritesOneLineForEachRow) {
   EXPECT_EQ(
-      FreshEvaluation::csv({{"best", 3, Policy::kPersonal, 1, 0, Split::kTrain, {-1.5, 0.25, 100}},
-                            {"last", 4, Policy::kMeta, -1, 2, Split::kTest, {200, 0, 100}}}),
+      FreshEvaluation::csv({{"best", 3, PolicyKind::kPersonal, 1, 0, Split::kTrain, {-1.5, 0.25, 100}},
+                            {"last", 4, PolicyKind::kMeta, -1, 2, Split::kTest, {200, 0, 100}}}),
       "snapshot,round,policy,trained_task,task,split,return_mean,return_std,episodes\n"
       "best,3,personal,1,0,train,-1.5,0.25,100\n"
       "last,4,meta,-1,2,test,200,0,100\n");

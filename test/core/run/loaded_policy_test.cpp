@@ -136,7 +136,7 @@ TEST(LoadedPolicy, ActsAsTheTableInMemory) {
   for (const int task : {0, 1}) {
     LoadedPolicy policy(run.policies + "task_" + std::to_string(task) + ".safetensors");
     EXPECT_EQ(policy.task(), task);
-    EXPECT_EQ(policy.policy(), Policy::kPersonal);
+    EXPECT_EQ(policy.policy(), PolicyKind::kPersonal);
     expectActsAsRecorded(policy, task);
   }
   LoadedPolicy meta(run.policies + "meta.safetensors");
@@ -203,7 +203,7 @@ TEST(LoadedPolicy, RefusesParametersThatDoNotFitTheirSettings) {
   const std::string path = dir / "policy.safetensors";
   const Experiment grid = gridExperiment();
   const auto error = [&](const std::string& key, const std::string& value) {
-    auto metadata = policyMetadata(grid, Policy::kPersonal, 2, 10);
+    auto metadata = policyMetadata(grid, PolicyKind::kPersonal, 2, 10);
     metadata[key] = value;
     if (value.empty()) metadata.erase(key);
     savePolicy(path, grid.makeLearner(2)->personal(), metadata);

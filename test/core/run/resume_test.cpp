@@ -7,9 +7,9 @@
 
 #include "../support.h"
 #include "checkpoint_experiments.h"
-#include "pmeta_core/run/checkpoint.h"
+#include "pmeta_core/storage/checkpoint.h"
 #include "pmeta_core/run/local_runner.h"
-#include "pmeta_core/run/policy_file.h"
+#include "pmeta_core/storage/policy_file.h"
 
 namespace pmeta {
 namespace {

@@ -43,7 +43,7 @@ TEST(TaskAgent, ReportsItsRound) {
   EXPECT_EQ(result->personal->run_id, "run");
   EXPECT_EQ(result->personal->round, 5);
   EXPECT_EQ(result->personal->task, 1);
-  EXPECT_EQ(result->personal->policy, Policy::kPersonal);
+  EXPECT_EQ(result->personal->policy, PolicyKind::kPersonal);
   EXPECT_EQ(result->personal->split, Split::kTrain);
   EXPECT_EQ(result->personal->episodes, 24);
   EXPECT_EQ(result->personal->updates, 3 * 2);
@@ -136,7 +136,7 @@ TEST(TaskAgent, EvaluatesTheMetaPolicyOnItsTask) {
   const std::vector<TaskReturn> results = agent.evaluateMeta(meta);
   ASSERT_EQ(results.size(), 1u);
   const TaskReturn& result = results.front();
-  EXPECT_EQ(result.policy, Policy::kMeta);
+  EXPECT_EQ(result.policy, PolicyKind::kMeta);
   EXPECT_EQ(result.round, 3);
   EXPECT_EQ(result.task, 2);
   EXPECT_EQ(result.run_id, "run");

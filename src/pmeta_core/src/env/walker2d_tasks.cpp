@@ -1,4 +1,4 @@
-#include "walker2d_tasks.h"
+#include "pmeta_core/env/walker2d_tasks.h"
 
 #include <mujoco/mujoco.h>
 

@@ -17,11 +17,11 @@
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/process.h"
 #include "pmeta_core/base/settings.h"
-#include "pmeta_core/env/model_check.h"
-#include "pmeta_core/env/trajectory_check.h"
-#include "pmeta_core/run/authentication.h"
+#include "pmeta_core/verify/model_check.h"
+#include "pmeta_core/verify/trajectory_check.h"
+#include "pmeta_core/security/authentication.h"
 #include "pmeta_core/run/console.h"
-#include "pmeta_core/run/key_file.h"
+#include "pmeta_core/security/key_file.h"
 #include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/run/local_runner.h"
 #include "pmeta_core/run/sweep.h"
@@ -349,7 +349,7 @@ int evaluate(const Arguments& arguments) {
     if (only >= 0 && task != only) continue;
     // what a personal policy knew of its task went with its agent: it explores anew
     const bool explores = experiment.contextEpisodes().size() > 1;
-    const pmeta::Policy kind = explores ? pmeta::Policy::kMeta : policy.policy();
+    const pmeta::PolicyKind kind = explores ? pmeta::PolicyKind::kMeta : policy.policy();
     const pmeta::ReturnStats stats =
         pmeta::TaskAgent(experiment, task).evaluateFresh(kind, policy.model(), arguments.episodes);
     std::printf("task %d %s  return %s +- %s over %d episodes\n", task,

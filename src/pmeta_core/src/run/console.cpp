@@ -57,7 +57,7 @@ void RunConsole::takeRows(const RoundBook::Round& round) {
   for (const RoundRow& row : round.rows) {
     const TaskReturn& result = row.result;
     Courses& courses = tasks_.at(result.task);
-    if (result.policy == Policy::kPersonal) {
+    if (result.policy == PolicyKind::kPersonal) {
       courses.personal.add(result.mean, result.round);
     } else if (result.context_episodes == adapted_) {
       courses.meta.add(result.mean, result.round);

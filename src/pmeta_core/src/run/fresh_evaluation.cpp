@@ -18,7 +18,7 @@ void FreshEvaluation::offer(const RoundBook::Round& round, const std::vector<Tas
   if (last_meta_.value > best_meta_.value) best_meta_ = last_meta_;
   own_best_.resize(last_personal_.models.size());
   for (const RoundRow& row : round.rows) {
-    if (row.result.policy != Policy::kPersonal) continue;
+    if (row.result.policy != PolicyKind::kPersonal) continue;
     Kept& kept = own_best_[static_cast<std::size_t>(row.result.task)];
     if (!(row.result.mean > kept.value)) continue;
     kept = {summary.round, row.result.mean, {agents[row.result.task].personal()}};
@@ -34,17 +34,17 @@ std::vector<FreshReturn> FreshEvaluation::evaluate(const std::vector<TaskAgent>&
       for (int task = 0; task < n; ++task) {
         if (task != trained && !cross) continue;
         rows.push_back(
-            {snapshot, kept.round, Policy::kPersonal, trained, task, Split::kTrain,
-             agents[task].evaluateFresh(Policy::kPersonal, kept.models[trained], episodes)});
+            {snapshot, kept.round, PolicyKind::kPersonal, trained, task, Split::kTrain,
+             agents[task].evaluateFresh(PolicyKind::kPersonal, kept.models[trained], episodes)});
       }
     }
   };
   const auto meta = [&](const char* snapshot, const Kept& kept) {
     const int all = static_cast<int>(agents.size());
     for (int task = 0; task < all && !kept.models.empty(); ++task) {
-      rows.push_back({snapshot, kept.round, Policy::kMeta, -1, task,
+      rows.push_back({snapshot, kept.round, PolicyKind::kMeta, -1, task,
                       agents[task].trains() ? Split::kTrain : Split::kTest,
-                      agents[task].evaluateFresh(Policy::kMeta, kept.models[0], episodes)});
+                      agents[task].evaluateFresh(PolicyKind::kMeta, kept.models[0], episodes)});
     }
   };
   personal("last", last_personal_);
@@ -52,8 +52,8 @@ std::vector<FreshReturn> FreshEvaluation::evaluate(const std::vector<TaskAgent>&
   for (int task = 0; task < n; ++task) {
     if (own_best_[task].models.empty()) continue;
     rows.push_back(
-        {"own_best", own_best_[task].round, Policy::kPersonal, task, task, Split::kTrain,
-         agents[task].evaluateFresh(Policy::kPersonal, own_best_[task].models[0], episodes)});
+        {"own_best", own_best_[task].round, PolicyKind::kPersonal, task, task, Split::kTrain,
+         agents[task].evaluateFresh(PolicyKind::kPersonal, own_best_[task].models[0], episodes)});
   }
   // without a meta return there is no meta-policy to speak of
   if (!best_meta_.models.empty()) {

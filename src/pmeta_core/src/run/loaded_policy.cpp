@@ -128,10 +128,10 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file, int as_task
     : experiment_(experimentOf(file, path)), model_(std::move(file.model)) {
   round_ = numberOf(file, path, "round", experiment_.settings().rounds);
   const std::string& policy = textOf(file, path, "policy");
-  if (policy == name(Policy::kPersonal)) {
-    policy_ = Policy::kPersonal;
+  if (policy == name(PolicyKind::kPersonal)) {
+    policy_ = PolicyKind::kPersonal;
     task_ = numberOf(file, path, "task", experiment_.numTasks() - 1);
-  } else if (policy != name(Policy::kMeta)) {
+  } else if (policy != name(PolicyKind::kMeta)) {
     throw Error("the policy file " + path + " is of neither a personal nor a meta policy.");
   }
   env_ = experiment_.family().make(std::max(task_, 0));
@@ -171,7 +171,7 @@ std::vector<float> LoadedPolicy::taskInput(const PolicyFile& file, const std::st
   const SacSettings& sac = experiment_.settings().sac;
   if (sac.task_encoding == "none") return {};
   if (sac.task_encoding == "one_hot") {
-    const int task = policy_ == Policy::kPersonal ? task_ : as_task;
+    const int task = policy_ == PolicyKind::kPersonal ? task_ : as_task;
     if (task < 0 || task >= experiment_.numTasks()) {
       throw Error("the policy file " + path +
                   " is a meta-policy that must be told its task: choose one from 0 to " +
@@ -180,7 +180,7 @@ std::vector<float> LoadedPolicy::taskInput(const PolicyFile& file, const std::st
     return oneHot(task, experiment_.numTasks());
   }
   const auto size = static_cast<std::size_t>(sac.context.latent_size);
-  if (policy_ == Policy::kMeta) return std::vector<float>(size, 0.0f);  // the prior's mean
+  if (policy_ == PolicyKind::kMeta) return std::vector<float>(size, 0.0f);  // the prior's mean
   std::istringstream text(textOf(file, path, "task_input"));
   std::vector<float> latent;
   for (std::string word; std::getline(text, word, ',');) {

@@ -5,8 +5,8 @@
 #include <stdexcept>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/run/checkpoint.h"
-#include "pmeta_core/run/policy_file.h"
+#include "pmeta_core/storage/checkpoint.h"
+#include "pmeta_core/storage/policy_file.h"
 
 namespace pmeta {
 namespace {
@@ -89,10 +89,10 @@ class LocalRun {
 
   void savePolicies() const {
     const MetaPolicy& meta = aggregator_.metaPolicy();
-    saveRunPolicy(experiment_, Policy::kMeta, -1, meta.round, meta.model);
+    saveRunPolicy(experiment_, PolicyKind::kMeta, -1, meta.round, meta.model);
     for (const TaskAgent& agent : agents_) {
       if (!agent.trains()) continue;
-      saveRunPolicy(experiment_, Policy::kPersonal, agent.task(), meta.round, agent.personal(),
+      saveRunPolicy(experiment_, PolicyKind::kPersonal, agent.task(), meta.round, agent.personal(),
                     agent.taskInput());
     }
   }

@@ -81,7 +81,7 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   const bool scheduled = evaluations_.includes(round);
   if (scheduled || meta.evaluate) {
     Rng evaluation = evaluationRng();
-    TaskReturn personal = makeReturn(round, Policy::kPersonal, guarded(round, [&] {
+    TaskReturn personal = makeReturn(round, PolicyKind::kPersonal, guarded(round, [&] {
                                        return learner_->evaluate(learner_->personal(), evaluation);
                                      }));
     personal.broken_episodes += unreported_broken_;
@@ -151,7 +151,7 @@ std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) {
   const std::vector<AdaptedReturn> all =
       guarded(meta.round, [&] { return learner_->evaluateAdapted(meta.model, rng); });
   for (const AdaptedReturn& adapted : all) {
-    results.push_back(makeReturn(meta.round, Policy::kMeta, adapted.stats));
+    results.push_back(makeReturn(meta.round, PolicyKind::kMeta, adapted.stats));
     results.back().scheduled = scheduled;
     results.back().context_episodes = adapted.context_episodes;
     results.back().seconds = watch.seconds();
@@ -162,13 +162,13 @@ std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) {
   return results;
 }
 
-ReturnStats TaskAgent::evaluateFresh(Policy kind, const Model& policy, int episodes) const {
+ReturnStats TaskAgent::evaluateFresh(PolicyKind kind, const Model& policy, int episodes) const {
   ReturnStats total;
   double mean_of_squares = 0;
   for (std::uint64_t batch = 1; total.episodes < episodes; ++batch) {
     // rounds evaluate with round 0 of this stream
     Rng rng(seed_, task_, Stream::kEvaluate, batch);
-    const ReturnStats stats = kind == Policy::kPersonal
+    const ReturnStats stats = kind == PolicyKind::kPersonal
                                   ? learner_->evaluate(policy, rng)
                                   : learner_->evaluateAdapted(policy, rng).back().stats;
     const double share = static_cast<double>(stats.episodes) / (total.episodes + stats.episodes);
@@ -269,7 +269,7 @@ void TaskAgent::adjustWeight(double personal_return) {
 // the same draws for every policy and round: differences are the policies', not the dice's
 Rng TaskAgent::evaluationRng() const { return Rng(seed_, task_, Stream::kEvaluate); }
 
-TaskReturn TaskAgent::makeReturn(int round, Policy policy, const ReturnStats& stats) {
+TaskReturn TaskAgent::makeReturn(int round, PolicyKind policy, const ReturnStats& stats) {
   broken_episodes_ += stats.broken_episodes;
   if (!std::isfinite(stats.mean) || !std::isfinite(stats.std)) {
     fail(round,

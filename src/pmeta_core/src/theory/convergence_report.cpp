@@ -9,8 +9,8 @@
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/base/version.h"
-#include "pmeta_core/run/experiment.h"
-#include "pmeta_core/run/run_log.h"
+#include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/storage/run_log.h"
 #include "pmeta_core/theory/convergence.h"
 
 namespace pmeta {

@@ -13,7 +13,7 @@
 #include <mutex>
 #include <thread>
 
-#include "mailbox.h"
+#include "common/mailbox.h"
 #include "panel/run_state.h"
 #endif
 

@@ -20,7 +20,7 @@
 #include <cmath>
 
 #include "pmeta_core/base/format.h"
-#include "scene.h"
+#include "view/scene.h"
 
 namespace pmeta_nodes {
 namespace {

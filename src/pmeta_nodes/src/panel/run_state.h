@@ -11,7 +11,7 @@
 #include <optional>
 #include <string>
 
-#include "recent_returns.h"
+#include "common/recent_returns.h"
 
 namespace pmeta_nodes {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "pmeta_core/run/experiment.h"
-#include "pmeta_core/run/run_log.h"
+#include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/storage/run_log.h"
 
 namespace pmeta {
 

@@ -4,7 +4,7 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/model.h"
-#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/experiment/experiment.h"
 
 namespace pmeta {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "pmeta_core/run/protocol.h"
-#include "pmeta_core/run/run_log.h"
+#include "pmeta_core/messages/protocol.h"
+#include "pmeta_core/storage/run_log.h"
 #include "pmeta_core/run/task_agent.h"
 
 namespace pmeta {
@@ -14,7 +14,7 @@ namespace pmeta {
 struct FreshReturn {
   std::string snapshot;  ///< "last", "best" or "own_best"
   int round = 0;         ///< the round it is from
-  Policy policy = Policy::kPersonal;
+  PolicyKind policy = PolicyKind::kPersonal;
   int trained_task = -1;        ///< whose personal policy; -1 for the meta-policy
   int task = 0;                 ///< where it is evaluated
   Split split = Split::kTrain;  ///< of `task`

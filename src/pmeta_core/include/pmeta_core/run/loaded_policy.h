@@ -6,9 +6,9 @@
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/env/env.h"
 #include "pmeta_core/env/tabular_env.h"
-#include "pmeta_core/run/experiment.h"
-#include "pmeta_core/run/policy_file.h"
-#include "pmeta_core/run/protocol.h"
+#include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/storage/policy_file.h"
+#include "pmeta_core/messages/protocol.h"
 
 namespace pmeta {
 
@@ -26,7 +26,7 @@ class LoadedPolicy {
   const Experiment& experiment() const { return experiment_; }
   const EnvSpec& spec() const { return env_->spec(); }
   const Model& model() const { return model_; }
-  Policy policy() const { return policy_; }
+  PolicyKind policy() const { return policy_; }
   int task() const { return task_; }    ///< whose personal policy it is; -1 for a meta-policy
   int round() const { return round_; }  ///< rounds of training behind it
   /// For people, e.g. "personal policy of grid_4x4, round 10 of run RUN".
@@ -50,7 +50,7 @@ class LoadedPolicy {
 
   Experiment experiment_;
   Model model_;
-  Policy policy_ = Policy::kMeta;
+  PolicyKind policy_ = PolicyKind::kMeta;
   int task_ = -1;
   int round_ = 0;
   std::unique_ptr<Env> env_;  ///< of its task, or of task 0 for a meta-policy

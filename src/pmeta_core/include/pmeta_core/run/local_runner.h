@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/run/fresh_evaluation.h"
 #include "pmeta_core/run/meta_aggregator.h"
-#include "pmeta_core/run/run_log.h"
+#include "pmeta_core/storage/run_log.h"
 #include "pmeta_core/run/task_agent.h"
 
 namespace pmeta {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "pmeta_core/aggregate/norm_bound.h"
-#include "pmeta_core/run/experiment.h"
-#include "pmeta_core/run/protocol.h"
+#include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/messages/protocol.h"
 
 namespace pmeta {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "pmeta_core/run/experiment.h"
+#include "pmeta_core/experiment/experiment.h"
 
 namespace pmeta {
 

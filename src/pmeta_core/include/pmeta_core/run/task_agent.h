@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "pmeta_core/run/divergence.h"
-#include "pmeta_core/run/experiment.h"
-#include "pmeta_core/run/protocol.h"
+#include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/messages/protocol.h"
 
 namespace pmeta {
 
@@ -59,7 +59,7 @@ class TaskAgent {
 
   /// A policy on this task, on at least `episodes` episodes that no round evaluates; a meta-policy
   /// after the most exploration episodes it is evaluated after.
-  ReturnStats evaluateFresh(Policy kind, const Model& policy, int episodes) const;
+  ReturnStats evaluateFresh(PolicyKind kind, const Model& policy, int episodes) const;
 
   const Model& personal() const { return learner_->personal(); }
   /// What tells the personal policy its task beside the observations; empty if nothing does.
@@ -89,7 +89,7 @@ class TaskAgent {
   const Model& sent() const;
   void adjustWeight(double personal_return);
   Rng evaluationRng() const;
-  TaskReturn makeReturn(int round, Policy policy, const ReturnStats& stats);
+  TaskReturn makeReturn(int round, PolicyKind policy, const ReturnStats& stats);
   template <class Work>
   auto guarded(int round, const Work& work) const;
   [[noreturn]] void fail(int round, const std::string& what, const std::string& advice) const;

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pmeta_core/base/model.h"
+#include "pmeta_core/base/state.h"
+
+namespace pmeta {
+
+/// What the aggregator publishes: the meta-policy after `round` aggregations (0: the initial one).
+struct MetaPolicy {
+  std::string run_id;
+  int round = 0;
+  Model model;
+  std::vector<int> participants;  ///< tasks in this aggregation, ascending; empty for round 0
+  bool evaluate = false;  ///< somebody wants this and the personal policies after it evaluated
+  std::uint64_t incarnation = 0;  ///< of the aggregator; one started again may go back to a round
+  bool checkpoint = false;        ///< all are to save one after the round that begins with this
+  std::string settings_hash;      ///< Experiment::settingsHash() of the aggregator
+};
+
+/// What an agent sends at the end of its round: auxiliary (or, when averaging, personal)
+/// parameters.
+struct AuxiliaryUpdate {
+  std::string run_id;
+  int task = 0;
+  int round = 0;  ///< the round that was trained: one more than the meta-policy it began with
+  Model model;
+  double weight = 1;
+  std::string settings_hash;  ///< Experiment::settingsHash() of the agent
+};
+
+enum class PolicyKind { kPersonal, kMeta };
+enum class Split { kTrain, kTest };
+
+const char* name(PolicyKind policy);  ///< "personal", "meta"
+const char* name(Split split);    ///< "train", "test"
+
+/// Result of one evaluation of one policy on one task.
+struct TaskReturn {
+  std::string run_id;
+  int task = 0;
+  int round = 0;
+  bool scheduled = true;  ///< false: somebody asked for it; in no table, only to be looked at
+  Split split = Split::kTrain;
+  PolicyKind policy = PolicyKind::kPersonal;
+  int context_episodes = 0;  ///< meta-policy: exploration episodes that it has adapted from
+  double mean = 0;           ///< mean undiscounted return
+  double std = 0;            ///< over episodes
+  int episodes = 0;
+  std::int64_t env_steps = 0;  ///< training transitions of this round; 0 for the meta-policy
+  std::int64_t updates = 0;    ///< personalised updates of this round; 0 for the meta-policy
+  /// Episodes whose simulation broke down: of the evaluation, and of training since the last.
+  std::int64_t broken_episodes = 0;
+  double seconds = 0;  ///< wall time of this round's training and evaluation
+
+  /// All but run_id, which whoever loads it knows.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
+};
+
+/// One round as the aggregator saw it.
+struct RoundSummary {
+  std::string run_id;
+  int round = 0;
+  int rounds = 0;
+  double personal_return = 0;  ///< PP: mean over reported training tasks; NaN if none
+  double meta_return = 0;      ///< MP: the same, after adaptation; NaN if none
+  double test_return = 0;      ///< of the meta-policy on test tasks, after adaptation; NaN if none
+  std::vector<int> participants;
+  std::vector<int> missing;   ///< tasks whose update this round did without
+  std::vector<int> excluded;  ///< tasks whose update came but was left out of the aggregation
+  double seconds = 0;         ///< from the meta-policy's publication to the aggregation
+  double eta_seconds = 0;     ///< estimate until the last round
+  std::int64_t broken_episodes = 0;  ///< of all rounds so far
+
+  /// What is known when the round closes: round, participants, missing, excluded and seconds.
+  void saveState(StateWriter& writer) const;
+  void loadState(StateReader& reader);
+};
+
+/// Says that `who` has other settings than this party: a sentence.
+std::string otherSettings(const std::string& who, const std::string& theirs,
+                          const std::string& ours);
+
+}  // namespace pmeta

@@ -1,0 +1,383 @@
+#include "agent/task_agent_node.h"
+
+#include <ros/callback_queue.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/conversions.h"
+#include "common/run_node.h"
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
+#include "pmeta_core/run/divergence.h"
+#include "pmeta_core/storage/policy_file.h"
+
+namespace pmeta_nodes {
+namespace {
+
+using pmeta_msgs::AgentStatus;
+
+constexpr auto kFirstResend = std::chrono::seconds(2);
+constexpr auto kLongestResend = std::chrono::seconds(30);
+// after the aggregator has left: time for roslaunch to stop us before we leave by ourselves, since
+// it would respawn an agent that ends first
+constexpr auto kFarewell = std::chrono::seconds(10);
+constexpr double kAggregatorWait = 5.0;
+// one would do, but a forged one behind it must not push it out
+constexpr std::uint32_t kMetaPolicies = 8;
+
+}  // namespace
+
+TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task, bool resume)
+    : experiment_(experiment),
+      settings_hash_(experiment.settingsHash()),
+      resume_(resume),
+      agent_(experiment, task),
+      checkpoints_(experiment, task, agent_.layout()),
+      authenticator_(experiment.settings().key_file) {
+  status_.run_id = experiment.settings().run_id;
+  status_.task = static_cast<std::uint32_t>(task);
+  status_.task_name = experiment.family().taskName(task);
+  status_.updates_per_round = static_cast<std::uint32_t>(experiment.settings().updates_per_round);
+
+  const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+  const std::string trajectory = "task_" + std::to_string(task) + "/trajectory";
+  auxiliary_pub_ = nh_.advertise<pmeta_msgs::AuxiliaryUpdate>("auxiliary", 4);
+  // latching would keep only the last one for late viewers: they get both policies', of two rounds
+  returns_pub_ = nh_.advertise<pmeta_msgs::TaskReturn>(
+      "returns", 16, [this](const ros::SingleSubscriberPublisher& viewer) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        for (const auto& recent : recent_returns_) {
+          for (const auto& result : recent.second.all()) viewer.publish(*result);
+        }
+      });
+  status_pub_ = nh_.advertise<AgentStatus>("agent_status", 4, true);
+  if (experiment.settings().publish_trajectories) {
+    // latching would keep only the last policy's episode for late viewers: they get both
+    trajectory_pub_ = nh_.advertise<pmeta_msgs::Trajectory>(
+        trajectory, 4, [this](const ros::SingleSubscriberPublisher& viewer) {
+          const std::lock_guard<std::mutex> lock(mutex_);
+          for (const auto& episode : last_episodes_) viewer.publish(episode.second);
+        });
+  }
+  setState(AgentStatus::WAITING, "waiting for a meta-policy");
+  meta_sub_ =
+      nh_.subscribe("meta_policy", kMetaPolicies, &TaskAgentNode::onMetaPolicy, this, hints);
+  round_sub_ = nh_.subscribe("round", 4, &TaskAgentNode::onRound, this, hints);
+  status_timer_ = nh_.createWallTimer(ros::WallDuration(0.5),
+                                      [this](const ros::WallTimerEvent&) { publishStatus(); });
+  resend_timer_ =
+      nh_.createWallTimer(ros::WallDuration(0.5), [this](const ros::WallTimerEvent&) { resend(); });
+  health_ = std::make_unique<Health>(status_.task_name, "task agent", [this] { return health(); });
+  trainer_ = std::thread([this] { train(); });
+}
+
+TaskAgentNode::~TaskAgentNode() {
+  stop_ = true;
+  mailbox_.close();
+  if (trainer_.joinable()) trainer_.join();
+}
+
+int TaskAgentNode::spin() {
+  Clock::time_point alone_since = Clock::now();
+  while (!stopRequested() && !failed_) {
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
+    if (!run_ended_ || meta_sub_.getNumPublishers() > 0) alone_since = Clock::now();
+    if (Clock::now() - alone_since > kFarewell) break;
+  }
+  stop_ = true;
+  mailbox_.close();
+  trainer_.join();
+  return failed_ || gave_up_ ? 1 : 0;
+}
+
+bool TaskAgentNode::isAuthentic(const std::string& kind, pmeta::Authenticity authenticity) {
+  const std::string forgery = refusals_.judge(kind, authenticity);
+  if (forgery.empty()) return true;
+  if (!refusals_.mayTell()) return false;
+  ROS_WARN("ignored: %s%s", forgery.c_str(), refusals_.untold().c_str());
+  bool alone = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    alone = newest_round_ < 0;
+  }
+  if (alone) setState(AgentStatus::WAITING, "waiting for a meta-policy; ignored: " + forgery);
+  return false;
+}
+
+void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::Ptr& msg) {
+  if (!isAuthentic("a meta-policy", authenticate(authenticator_, *msg))) return;
+  if (msg->run_id != status_.run_id) {
+    ROS_WARN_THROTTLE(10, "ignoring a meta-policy of run %s; this agent belongs to %s.",
+                      pmeta::shown(msg->run_id).c_str(), pmeta::shown(status_.run_id).c_str());
+    return;
+  }
+  if (msg->settings_hash != settings_hash_) {
+    const std::string mismatch =
+        pmeta::otherSettings("the aggregator", msg->settings_hash, settings_hash_);
+    ROS_ERROR_THROTTLE(10, "ignored: %s", mismatch.c_str());
+    return setState(AgentStatus::WAITING, mismatch);
+  }
+  {
+    // a newer meta-policy shows that the aggregator has all we owed it for the rounds before
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const int round = static_cast<int>(msg->round);
+    const bool started_again = msg->incarnation > incarnation_;
+    if (msg->incarnation < incarnation_ || (!started_again && round <= newest_round_)) return;
+    newest_round_ = round;
+    incarnation_ = msg->incarnation;
+    // what an aggregator that was started again lacks is made anew from its meta-policy
+    const auto confirmed = [&](const auto& sent) {
+      return started_again || static_cast<int>(sent.round) <= round;
+    };
+    unconfirmed_updates_.erase(
+        std::remove_if(unconfirmed_updates_.begin(), unconfirmed_updates_.end(), confirmed),
+        unconfirmed_updates_.end());
+    unconfirmed_returns_.erase(
+        std::remove_if(unconfirmed_returns_.begin(), unconfirmed_returns_.end(), confirmed),
+        unconfirmed_returns_.end());
+  }
+  mailbox_.push(msg);
+}
+
+void TaskAgentNode::onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
+  if (!isAuthentic("a round message", authenticate(authenticator_, *msg))) return;
+  if (msg->run_id != status_.run_id) return;
+  if (authenticator_.hasKey() && !news_.take(msg->header.stamp)) {
+    return refusals_.count("replayed: a round message");
+  }
+  if (msg->state != pmeta_msgs::RoundSummary::FINISHED &&
+      msg->state != pmeta_msgs::RoundSummary::STOPPED) {
+    return;
+  }
+  run_ended_ = true;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  unconfirmed_returns_.clear();
+  unconfirmed_updates_.clear();
+}
+
+void TaskAgentNode::train() {
+  try {
+    while (!stop_ && !gave_up_) {
+      const auto msg = mailbox_.pop(std::chrono::seconds(1));
+      if (!msg) continue;
+      try {
+        trainFrom(fromMsg(std::move(**msg)));
+      } catch (const pmeta::TaskFailed& failure) {
+        ROS_ERROR("%s", failure.what());
+        gave_up_ = true;
+        setState(AgentStatus::FAILED, failure.what());
+      } catch (const pmeta::Error& error) {
+        // a meta-policy that does not fit is not trained on; a good one may still come
+        ROS_ERROR("%s", error.what());
+        setState(AgentStatus::WAITING, error.what());
+      }
+    }
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    // nothing that is known to come again: roslaunch starts this process anew
+    setState(AgentStatus::WAITING, error.what());
+    failed_ = true;
+  }
+}
+
+void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
+  const int rounds = experiment_.settings().rounds;
+  waitForAggregator();
+  if (meta.round > 0 && experiment_.evaluatesMeta() &&
+      (meta.evaluate || experiment_.evaluationSchedule().includes(meta.round))) {
+    setState(AgentStatus::EVALUATING,
+             "evaluating the meta-policy of round " + std::to_string(meta.round));
+    for (const pmeta::TaskReturn& result : agent_.evaluateMeta(meta)) deliver(result);
+    if (trajectory_pub_) publishEpisode(agent_.recordMeta(meta), meta.round, pmeta::PolicyKind::kMeta);
+  }
+  if (meta.round >= rounds) {
+    setState(AgentStatus::DONE, "all " + std::to_string(rounds) + " rounds are done");
+    return;
+  }
+
+  if (!agent_.trains()) {
+    setState(AgentStatus::WAITING,
+             "test task: waiting for the meta-policy of round " + std::to_string(meta.round + 1));
+    return;
+  }
+
+  const int round = meta.round + 1;
+  returnTo(meta);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_.round = static_cast<std::uint32_t>(round);
+    status_.update = 0;
+  }
+  setState(AgentStatus::TRAINING, "training round " + std::to_string(round));
+  const Clock::time_point start = Clock::now();
+  if (!round_end_) round_end_ = start;
+  auto result = agent_.trainRound(meta, [this](int done) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_.update = static_cast<std::uint32_t>(done);
+    return !stop_;
+  });
+  if (!result) return;
+  const Clock::time_point end = Clock::now();
+  const Clock::time_point before = *std::exchange(round_end_, end);
+  const double seconds = std::chrono::duration<double>(end - before).count();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_.env_steps_per_s = static_cast<double>(result->env_steps) / seconds;
+    status_.updates_per_s = static_cast<double>(result->updates) / seconds;
+    status_.loss = result->loss;
+    status_.broken_episodes = static_cast<std::uint64_t>(agent_.brokenEpisodes());
+    status_.distance_to_meta = result->distance;
+    status_.train_s = std::chrono::duration<double>(end - start).count();
+  }
+  if (experiment_.checkpointsAfter(round) || meta.checkpoint) saveCheckpoint(round);
+  // before the aggregator can end the run, and with it this process
+  if (round == rounds) savePersonal();
+  if (result->personal) deliver(*result->personal);
+  deliver(std::move(result->update));
+  if (trajectory_pub_ && result->personal) {
+    publishEpisode(agent_.recordPersonal(), round, pmeta::PolicyKind::kPersonal);
+  }
+  setState(AgentStatus::WAITING, "waiting for the meta-policy of round " + std::to_string(round));
+}
+
+// whoever has just been started, or has run ahead of the meta-policy, goes where that is
+void TaskAgentNode::returnTo(const pmeta::MetaPolicy& meta) {
+  const int have = agent_.round();
+  const bool ahead = have > meta.round + 1;
+  // at round 0 too: it may have ended between saving and sending round 1
+  const bool started = have == 0 && resume_;
+  if (!ahead && !started) return;
+  std::vector<std::string> refused;
+  const auto fresh = [this]() -> pmeta::TaskAgent& {
+    agent_ = pmeta::TaskAgent(experiment_, agent_.task());
+    return agent_;
+  };
+  const int round = checkpoints_.loadNewest(meta.round + 1, fresh, refused);
+  for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
+  saved_round_ = round;
+  if (round > 0) ROS_INFO("%s goes on after round %d.", status_.task_name.c_str(), round);
+  if (round < meta.round) {
+    ROS_WARN("%s has lost what it learnt in the rounds %d to %d: no good checkpoint is newer.",
+             status_.task_name.c_str(), round + 1, meta.round);
+  }
+}
+
+void TaskAgentNode::saveCheckpoint(int round) {
+  if (round == saved_round_) return;
+  std::string trouble;
+  try {
+    checkpoints_.save(round, agent_);
+    saved_round_ = round;
+  } catch (const pmeta::Error& error) {
+    // training goes on: what is at stake is only how much a crash would cost
+    trouble = error.what();
+    ROS_ERROR("%s The run goes on without this checkpoint.", error.what());
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  checkpoint_trouble_ = trouble;
+}
+
+void TaskAgentNode::savePersonal() const {
+  try {
+    pmeta::saveRunPolicy(experiment_, pmeta::PolicyKind::kPersonal, agent_.task(),
+                         experiment_.settings().rounds, agent_.personal(), agent_.taskInput());
+  } catch (const pmeta::Error& error) {
+    // the others can do without this machine's file
+    ROS_ERROR("the personal policy is not kept: %s", error.what());
+  }
+}
+
+void TaskAgentNode::waitForAggregator() {
+  const ros::WallTime limit = ros::WallTime::now() + ros::WallDuration(kAggregatorWait);
+  while (!stop_ && ros::WallTime::now() < limit &&
+         (auxiliary_pub_.getNumSubscribers() == 0 || returns_pub_.getNumSubscribers() == 0)) {
+    ros::WallDuration(0.005).sleep();
+  }
+}
+
+void TaskAgentNode::deliver(const pmeta::TaskReturn& result) {
+  pmeta_msgs::TaskReturn msg = toMsg(result, status_.task_name);
+  msg.header.stamp = ros::Time::now();
+  sign(authenticator_, msg);
+  returns_pub_.publish(msg);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  recent_returns_[result.policy].take(boost::make_shared<const pmeta_msgs::TaskReturn>(msg));
+  unconfirmed_returns_.push_back(std::move(msg));
+  resend_wait_ = kFirstResend;
+  next_resend_ = Clock::now() + resend_wait_;
+}
+
+void TaskAgentNode::deliver(pmeta::AuxiliaryUpdate update) {
+  pmeta_msgs::AuxiliaryUpdate msg = toMsg(std::move(update));
+  msg.header.stamp = ros::Time::now();
+  sign(authenticator_, msg);
+  auxiliary_pub_.publish(msg);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  unconfirmed_updates_.push_back(std::move(msg));
+  resend_wait_ = kFirstResend;
+  next_resend_ = Clock::now() + resend_wait_;
+}
+
+void TaskAgentNode::publishEpisode(const pmeta::Episode& episode, int round, pmeta::PolicyKind policy) {
+  pmeta_msgs::Trajectory msg = toMsg(episode, experiment_, agent_.task(), round, policy);
+  msg.header.stamp = ros::Time::now();
+  trajectory_pub_.publish(msg);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  last_episodes_[policy] = std::move(msg);
+}
+
+void TaskAgentNode::resend() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (unconfirmed_returns_.empty() && unconfirmed_updates_.empty()) return;
+  if (Clock::now() < next_resend_) return;
+  for (const auto& msg : unconfirmed_returns_) returns_pub_.publish(msg);
+  for (const auto& msg : unconfirmed_updates_) auxiliary_pub_.publish(msg);
+  // an aggregator that waits for others must not be flooded with large blobs
+  resend_wait_ = std::min<std::chrono::seconds>(2 * resend_wait_, kLongestResend);
+  next_resend_ = Clock::now() + resend_wait_;
+}
+
+void TaskAgentNode::setState(std::uint8_t state, const std::string& message) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_.state = state;
+    status_.message = message;
+  }
+  publishStatus();
+}
+
+void TaskAgentNode::publishStatus() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  status_.header.stamp = ros::Time::now();
+  status_.state_name = stateName(status_);
+  status_.incarnation = incarnation_;
+  sign(authenticator_, status_);
+  status_pub_.publish(status_);
+}
+
+HealthReport TaskAgentNode::health() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  HealthReport report;
+  report.level = status_.state == AgentStatus::FAILED ? HealthReport::kError
+                 : !checkpoint_trouble_.empty()       ? HealthReport::kWarn
+                                                      : HealthReport::kOk;
+  report.summary = checkpoint_trouble_.empty() ? status_.message : checkpoint_trouble_;
+  report.values = {{"state", stateName(status_)},
+                   {"round", std::to_string(status_.round)},
+                   {"updates/s", pmeta::formatNumber(status_.updates_per_s)},
+                   {"env steps/s", pmeta::formatNumber(status_.env_steps_per_s)},
+                   {"loss", pmeta::formatNumber(status_.loss)},
+                   {"distance to meta", pmeta::formatNumber(status_.distance_to_meta)},
+                   {"broken episodes", std::to_string(status_.broken_episodes)},
+                   {"unconfirmed messages",
+                    std::to_string(unconfirmed_returns_.size() + unconfirmed_updates_.size())}};
+  for (auto& value : refusals_.values()) {
+    // of strangers only: it is not taking part
+    if (newest_round_ < 0) report.level = std::max(report.level, HealthReport::kWarn);
+    report.values.push_back(std::move(value));
+  }
+  return report;
+}
+
+}  // namespace pmeta_nodes

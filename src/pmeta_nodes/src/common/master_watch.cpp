@@ -1,0 +1,68 @@
+#include "common/master_watch.h"
+
+#include <ros/ros.h>
+
+#include <algorithm>
+
+namespace pmeta_nodes {
+namespace {
+
+constexpr std::chrono::seconds kEvery{2};
+
+enum class Master { kKnowsUs, kHasForgottenUs, kGone };
+
+Master askMaster() {
+  XmlRpc::XmlRpcValue request, response, payload;
+  request[0] = ros::this_node::getName();
+  request[1] = ros::this_node::getName();
+  if (ros::master::execute("lookupNode", request, response, payload, false)) {
+    return Master::kKnowsUs;
+  }
+  return ros::master::check() ? Master::kHasForgottenUs : Master::kGone;
+}
+
+}  // namespace
+
+MasterWatch::MasterWatch(std::chrono::duration<double> patience)
+    : patience_(patience), thread_([this] { watch(); }) {}
+
+MasterWatch::~MasterWatch() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  stopping_.notify_all();
+  thread_.join();
+}
+
+std::string MasterWatch::trouble() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return trouble_;
+}
+
+bool MasterWatch::waitFor(std::chrono::duration<double> time) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  return !stopping_.wait_for(lock, time, [this] { return stop_; });
+}
+
+void MasterWatch::watch() {
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point good = Clock::now();
+  while (waitFor(kEvery)) {
+    const Master master = askMaster();
+    if (master == Master::kKnowsUs) {
+      good = Clock::now();
+      continue;
+    }
+    if (master == Master::kGone && Clock::now() - good < patience_) continue;
+    const std::string uri = ros::master::getURI();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    trouble_ = master == Master::kGone
+                   ? "the ROS master at " + uri + " has been out of reach for " +
+                         std::to_string(static_cast<int>(patience_.count())) + " s"
+                   : "the ROS master at " + uri + " was restarted and does not know this node";
+    return;
+  }
+}
+
+}  // namespace pmeta_nodes

@@ -1,0 +1,86 @@
+#include "common/run_node.h"
+
+#include <ros/master.h>
+
+#include <csignal>
+#include <cstring>
+#include <iostream>
+#include <memory>
+
+#include "common/free_memory.h"
+#include "common/master_watch.h"
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/process.h"
+#include "common/private_param.h"
+
+namespace pmeta_nodes {
+namespace {
+
+std::unique_ptr<MasterWatch> g_master;
+
+constexpr double kAskAgain = 0.2;  // seconds between two attempts at the master
+
+}  // namespace
+
+void initNode(int argc, char** argv, const std::string& name, std::uint32_t options) {
+  ros::init(argc, argv, name, options);
+  // a script's background process has it ignored
+  std::signal(SIGINT, SIG_DFL);
+  if (ros::master::check()) return;
+  ROS_WARN("waiting for the ROS master at %s; start one with roscore.",
+           ros::master::getURI().c_str());
+  while (!ros::master::check()) ros::WallDuration(kAskAgain).sleep();
+}
+
+int runNode(int argc, char** argv, const std::string& name, const std::string& help,
+            const std::function<int(const pmeta::Experiment&)>& body) {
+  pmeta::prepareProcess();
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
+      std::cout << help;
+      return 0;
+    }
+  }
+  boundFreeMemory();
+  initNode(argc, argv, name, ros::init_options::NoSigintHandler);
+  // outside the try: the console falls silent when the last node handle goes
+  const ros::NodeHandle nh;
+  // our own handlers: the last words of a run are published before ROS goes down
+  pmeta::heedStopSignals();
+  try {
+    const pmeta::Experiment experiment = readExperiment(nh);
+    g_master = std::make_unique<MasterWatch>();
+    int code = body(experiment);
+    const std::string trouble = g_master->trouble();
+    if (!trouble.empty()) {
+      ROS_FATAL("%s: this node has stopped. Start the run again with resume:=%s.", trouble.c_str(),
+                experiment.runDir().c_str());
+      code = 1;
+    }
+    g_master.reset();
+    ros::shutdown();
+    return code;
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    ros::shutdown();
+    return 1;
+  }
+}
+
+bool stopRequested() {
+  return pmeta::stopSignalled() || !ros::ok() || (g_master && !g_master->trouble().empty());
+}
+
+pmeta::Experiment readExperiment(const ros::NodeHandle& nh) {
+  const std::string file = privateText("config_file", "");
+  if (!file.empty()) return pmeta::Experiment::load(file);
+  std::string text;
+  if (!nh.getParam("config", text)) {
+    throw pmeta::Error("the parameter " + nh.resolveName("config") +
+                       " is not set: start with roslaunch pmeta_nodes gridworld.launch, or give "
+                       "_config_file:=FILE.");
+  }
+  return pmeta::Experiment::parse(text, "the parameter " + nh.resolveName("config"));
+}
+
+}  // namespace pmeta_nodes

@@ -1,0 +1,63 @@
+#include <csignal>
+#include <cstring>
+#include <iostream>
+
+#include "common/run_node.h"
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/process.h"
+#include "policy/policy_node.h"
+#include "common/private_param.h"
+
+namespace {
+
+constexpr char kHelp[] =
+    R"(policy_node: acts with a trained policy from a file.
+
+  rosrun pmeta_nodes policy_node _policy:=RUN_FOLDER/policies/task_0.safetensors
+
+private parameters
+  ~policy      policy file of a run (required)
+  ~task        which task to act on; for a meta-policy that is told its task by a one-hot input
+subscribes   observation (std_msgs/Float64MultiArray): as many numbers as the environment's have
+publishes    action (std_msgs/Float64MultiArray): the greedy action, one number if it is discrete;
+             /diagnostics
+An observation of a wrong size, or that is not finite, gets a warning and no action.
+)";
+
+constexpr int kMostTasks = 1000000;  // whose policy it is decides how many there are
+
+void onSignal(int) { ros::requestShutdown(); }
+
+void act() {
+  const std::string path = pmeta_nodes::privateText("policy", "");
+  if (path.empty()) {
+    throw pmeta::Error(
+        "which policy? Give the private parameter policy, e.g. "
+        "_policy:=RUN_FOLDER/policies/task_0.safetensors.");
+  }
+  const pmeta_nodes::PolicyNode node(path, pmeta_nodes::privateIndex("task", -1, kMostTasks));
+  ros::spin();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  pmeta::prepareProcess();
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
+      std::cout << kHelp;
+      return 0;
+    }
+  }
+  pmeta_nodes::initNode(argc, argv, "policy_node");
+  std::signal(SIGTERM, onSignal);
+  // outside the try: the console falls silent when the last node handle goes
+  const ros::NodeHandle nh;
+  try {
+    act();
+    return 0;
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,40 @@
+#pragma once
+
+#include "draw/card.h"
+#include "pmeta_core/env/cart_pole.h"
+
+namespace pmeta_nodes {
+
+/// The cart-poles: a lane for each policy, with the cart and pole that play the episode, to scale,
+/// above the trace of the cart's positions, in which time runs down.
+///
+/// The lane's frame has its origin on the track where the cart's position is 0. A fallen pole turns
+/// grey. Poles of more than kLongestPole are drawn with that length.
+class CartPoleScene : public Scene {
+ public:
+  static constexpr double kTimeStep = 0.02;      ///< s, the environment's
+  static constexpr double kPositionLimit = 2.4;  ///< m, beyond which an episode ends
+  static constexpr double kCartHeight = 0.24;    ///< m; the pole turns about the middle of its top
+  static constexpr double kLongestPole = 3;      ///< m
+
+  explicit CartPoleScene(const pmeta::CartPoleFamily& family);
+
+  std::vector<geometry_msgs::TransformStamped> frames() const override;
+  std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;
+  double stepSeconds() const override { return kTimeStep; }
+  visualization_msgs::MarkerArray still(const SceneContent& content) const override;
+  visualization_msgs::MarkerArray moving(const SceneContent& content,
+                                         const std::vector<double>& seconds) override;
+
+  double scale() const { return cards_.scale; }  ///< units of the scene for 1 m
+
+ private:
+  double poleLength(int task) const;
+  void drawMoving(const PolicyView& view, int task, int policy, double seconds,
+                  visualization_msgs::MarkerArray& scene) const;
+
+  const pmeta::CartPoleFamily& family_;
+  Cards cards_;
+};
+
+}  // namespace pmeta_nodes

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "draw/card.h"
+#include "draw/robot_figure.h"
+
+namespace pmeta_nodes {
+
+/// What a robot is to do.
+struct RobotTarget {
+  double direction = 0;            ///< angle in the plane, rad, 0 along x
+  std::optional<double> velocity;  ///< m/s; none: as fast as possible
+};
+
+/// How a kind of robot is looked at.
+struct RobotCamera {
+  double elevation = 0;     ///< rad; 0 for robots that move in a plane, seen from its side
+  double view_width = 2.6;  ///< m, at least so much of the floor is seen
+  double view_depth = 0;    ///< m, the same across; 0 where elevation is
+};
+
+/// The robots of MuJoCo: a lane for each policy, in which the model's geoms play the episode by
+/// forward kinematics of the recorded configurations, while floor and view follow the torso.
+///
+/// "task_<i>/personal" and "task_<i>/meta" have their origins on the floor below the torso, x along
+/// the lane, y up; "task_<i>/meta/robot" and its like below them is the model's world, moved along
+/// with the torso, and turned so that z goes up the lane. One metre is scale() in both.
+class RobotScene : public Scene {
+ public:
+  /// `targets` has one for each task, test tasks last. Throws Error where the model has parts that
+  /// cannot be drawn. `family` must outlive the scene.
+  RobotScene(const pmeta::EnvFamily& family, std::vector<RobotTarget> targets,
+             const RobotCamera& camera);
+
+  std::vector<geometry_msgs::TransformStamped> frames() const override;
+  std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;
+  double stepSeconds() const override { return step_seconds_; }
+  visualization_msgs::MarkerArray still(const SceneContent& content) const override;
+  visualization_msgs::MarkerArray moving(const SceneContent& content,
+                                         const std::vector<double>& seconds) override;
+
+  double scale() const { return cards_.scale; }  ///< units of the scene for 1 m
+
+ private:
+  /// Positions of the torso in an episode, worked out once.
+  struct Path {
+    pmeta_msgs::Trajectory::ConstPtr episode;
+    std::vector<Position> torso;
+  };
+  /// One robot at one moment.
+  struct Moment {
+    int task = 0;
+    int policy = 0;
+    pmeta_msgs::Trajectory::ConstPtr episode;  ///< null: nothing to show
+    std::size_t step = 0;
+    const std::vector<Position>* torso = nullptr;
+    std::string lane_frame;
+    std::string robot_frame;
+  };
+
+  const std::vector<Position>& pathOf(int task, int policy,
+                                      const pmeta_msgs::Trajectory::ConstPtr& episode);
+  bool isPlanar() const { return camera_.elevation == 0; }
+  double halfWidth() const;  ///< m of floor on either side of the torso
+  RobotPicture pictureOf(const Moment& moment) const;
+  void drawFloor(const Moment& moment, visualization_msgs::MarkerArray& scene) const;
+  visualization_msgs::Marker drawPath(const Moment& moment) const;
+  void drawTarget(int task, int policy, visualization_msgs::MarkerArray& scene) const;
+  std::string speedText(const Moment& moment) const;
+
+  const pmeta::EnvFamily& family_;
+  std::vector<RobotTarget> targets_;
+  RobotCamera camera_;
+  std::unique_ptr<pmeta::MujocoKinematics> kinematics_;
+  double step_seconds_ = 0;
+  int torso_ = 0;
+  double rest_height_ = 0;  // m, of the highest point at rest
+  Cards cards_;
+  std::map<std::pair<int, int>, Path> paths_;
+};
+
+/// The scene of a family of MuJoCo; null if it is none. Tasks from its numTasks() to `num_tasks`
+/// are test tasks.
+std::unique_ptr<Scene> makeRobotScene(const pmeta::EnvFamily& family, int num_tasks);
+
+}  // namespace pmeta_nodes

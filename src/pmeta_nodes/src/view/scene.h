@@ -1,0 +1,90 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <geometry_msgs/TransformStamped.h>
+#include <pmeta_msgs/RoundSummary.h>
+#include <pmeta_msgs/TaskReturn.h>
+#include <pmeta_msgs/Trajectory.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include "pmeta_core/experiment/experiment.h"
+
+namespace pmeta_nodes {
+
+/// What is known of one policy on one task. Null: nothing yet.
+struct PolicyView {
+  pmeta_msgs::Trajectory::ConstPtr episode;  ///< must be drawable, see Scene::problem()
+  pmeta_msgs::TaskReturn::ConstPtr result;
+};
+
+/// Both policies on one task.
+struct TaskView {
+  PolicyView personal;
+  PolicyView meta;
+};
+
+/// All that a scene shows.
+struct SceneContent {
+  std::string experiment;
+  int rounds = 0;                ///< C
+  bool has_trajectories = true;  ///< false: agents send none, and the title says so
+  bool has_meta = true;          ///< false: independent training, and the scene says so
+  std::vector<TaskView> tasks;   ///< one for each task, test tasks last
+  pmeta_msgs::RoundSummary::ConstPtr summary;  ///< null: no round yet
+};
+
+/// A scene, in its world frame `pmeta`, is a box of this size around the origin, seen from +z. It
+/// is the same for any number of tasks, so that one rviz view fits all experiments.
+constexpr double kSceneWidth = 12;
+constexpr double kSceneHeight = 7.2;
+constexpr char kWorldFrame[] = "pmeta";
+
+/// What one family of environments looks like: all tasks side by side, each in frames of its own
+/// below the world frame.
+///
+/// Namespaces name layers, ids follow from task and policy: every call gives the same set of them,
+/// with DELETE for what is not there. Their number and length are bounded, whatever agents send.
+class Scene {
+ public:
+  virtual ~Scene() = default;
+
+  /// Frames of all tasks; they never change.
+  virtual std::vector<geometry_msgs::TransformStamped> frames() const = 0;
+
+  /// Why this message, of one of the scene's tasks, cannot be drawn, in a sentence; "" if it can.
+  virtual std::string problem(const pmeta_msgs::Trajectory& trajectory) const = 0;
+
+  /// What changes only with `content`.
+  virtual visualization_msgs::MarkerArray still(const SceneContent& content) const = 0;
+
+  /// How long a step of an episode takes when it is played, in s; 0: nothing is played.
+  virtual double stepSeconds() const { return 0; }
+
+  /// What is played: for each task, its episodes `seconds[task]` after their start.
+  virtual visualization_msgs::MarkerArray moving(const SceneContent& /*content*/,
+                                                 const std::vector<double>& /*seconds*/) {
+    return {};
+  }
+};
+
+/// The scene of the experiment's environment; null if there is none. The experiment must outlive
+/// it.
+std::unique_ptr<Scene> makeScene(const pmeta::Experiment& experiment);
+
+/// Steps of an episode: the number of its rewards.
+std::size_t numSteps(const pmeta_msgs::Trajectory& trajectory);
+
+/// The step that is seen so long after the start: the last one that has been made.
+std::size_t stepAt(const pmeta_msgs::Trajectory& trajectory, double seconds, double step_seconds);
+
+/// Steps 0 to `last`, evenly thinned out to about `most` where there are more; the last is kept.
+std::vector<std::size_t> thinnedSteps(std::size_t last, std::size_t most);
+
+/// Why the arrays of this message do not fit one another, in a sentence; "" if all is well: a known
+/// policy, finite observations of that size, actions and rewards for each step.
+std::string formProblem(const pmeta_msgs::Trajectory& trajectory, std::size_t observation_size);
+
+}  // namespace pmeta_nodes
