@@ -52,8 +52,8 @@ TEST(Env, AStepIsJudgedByItsSparseRewardIfItHasOne) {
 
 // training and test tasks have names of their own, and the environments that the names promise
 TEST(Env, FamiliesTellTheirTasksApart) {
-  for (const std::string& name : envFamilyNames()) {
-    const auto family = makeEnvFamily(name);
+  for (const std::string& name : envFamilies().names()) {
+    const auto family = envFamilies().at(name)();
     family->build(0);
     std::set<std::string> names;
     const int count = family->numTasks() + family->numTestTasks();
@@ -70,8 +70,8 @@ TEST(Env, FamiliesTellTheirTasksApart) {
 
 // every family hands out states that go on as the original does
 TEST(Env, GoesOnFromItsState) {
-  for (const std::string& name : envFamilyNames()) {
-    const auto family = makeEnvFamily(name);
+  for (const std::string& name : envFamilies().names()) {
+    const auto family = envFamilies().at(name)();
     family->build(0);
     const auto one = family->make(0), other = family->make(0);
     const EnvSpec& spec = one->spec();

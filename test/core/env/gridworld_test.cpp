@@ -280,11 +280,11 @@ TEST(GridworldFamily, BadSettingsAreRefused) {
 }
 
 TEST(Registry, KnowsTheGridworldAndListsItForUnknownNames) {
-  EXPECT_NE(makeEnvFamily("gridworld"), nullptr);
-  const std::string known = " Known are " + join(envFamilyNames()) + ".";
-  EXPECT_EQ(errorOf([] { makeEnvFamily("gridwrld"); }),
+  EXPECT_NE(envFamilies().at("gridworld")(), nullptr);
+  const std::string known = " Known are " + join(envFamilies().names()) + ".";
+  EXPECT_EQ(errorOf([] { envFamilies().at("gridwrld")(); }),
             "unknown environment 'gridwrld': did you mean 'gridworld'?" + known);
-  EXPECT_EQ(errorOf([] { makeEnvFamily("moon_landing"); }),
+  EXPECT_EQ(errorOf([] { envFamilies().at("moon_landing")(); }),
             "unknown environment 'moon_landing'." + known);
 }
 

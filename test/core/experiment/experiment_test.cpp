@@ -194,7 +194,7 @@ TEST(Experiment, UnknownEnvironmentsAreRefusedWhereverTheyAreNamed) {
   const std::string sentence =
       "unknown environment 'gridwrld': did you mean 'gridworld'? Known "
       "are " +
-      join(envFamilyNames()) + ".";
+      join(envFamilies().names()) + ".";
   EXPECT_EQ(errorOf([] { Experiment::parse("environment: {name: gridwrld}", "a.yaml"); }),
             sentence);
   for (const std::string given : {"environment.name:=gridwrld", "environment.name:=\"gridwrld\"",
@@ -206,14 +206,14 @@ TEST(Experiment, UnknownEnvironmentsAreRefusedWhereverTheyAreNamed) {
 TEST(Experiment, OverridingAnUnknownEnvironmentDoesNotHideIt) {
   EXPECT_EQ(refused({"name:=gridwrld", "environment.name:=\"gridworld\""}),
             "environment.name is 'gridwrld' (given as name:=gridwrld) but must be one of " +
-                join(envFamilyNames()) + ".");
+                join(envFamilies().names()) + ".");
   EXPECT_EQ(gridExperiment({"environment.name:=gridworld"}).settings().environment, "gridworld");
   EXPECT_EQ(errorOf([] {
               Experiment::parse("environment: {name: gridwrld}", "a.yaml",
                                 {"environment.name:=gridworld"});
             }),
             "environment.name is 'gridwrld' (a.yaml line 1) but must be one of " +
-                join(envFamilyNames()) + ".");
+                join(envFamilies().names()) + ".");
 }
 
 TEST(Experiment, OddEnvironmentSectionsAreRefused) {

@@ -8,6 +8,8 @@
 namespace pmeta {
 namespace {
 
+const RegisteredFamily<AntFwdBackFamily> kAntFwdBack("ant_fwd_back");
+
 constexpr char kName[] = "ant_fwd_back";
 constexpr int kFrameSkip = 5;
 constexpr double kControlCost = 0.5;

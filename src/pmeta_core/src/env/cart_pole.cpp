@@ -9,6 +9,8 @@
 namespace pmeta {
 namespace {
 
+const RegisteredFamily<CartPoleFamily> kCartPole("cart_pole");
+
 constexpr double kGravity = 9.8;
 constexpr double kCartMass = 1.0;
 constexpr double kTimeStep = 0.02;

@@ -8,6 +8,11 @@
 
 namespace pmeta {
 
+Registry<EnvFamilyMaker>& envFamilies() {
+  static Registry<EnvFamilyMaker> families("environment");
+  return families;
+}
+
 std::vector<double> Env::state() const {
   throw Error("environment '" + spec().name + "' cannot hand out its state.");
 }

@@ -10,6 +10,8 @@
 namespace pmeta {
 namespace {
 
+const RegisteredFamily<GridworldFamily> kGridworld("gridworld");
+
 constexpr int kNumMoves = 4;
 constexpr int kRowStep[kNumMoves] = {-1, 1, 0, 0};  // up, down, left, right
 constexpr int kColumnStep[kNumMoves] = {0, 0, -1, 1};

@@ -9,6 +9,9 @@
 namespace pmeta {
 namespace {
 
+const RegisteredFamily<HalfCheetahDirFamily> kHalfCheetahDir("half_cheetah_dir");
+const RegisteredFamily<HalfCheetahVelFamily> kHalfCheetahVel("half_cheetah_vel");
+
 constexpr int kFrameSkip = 5;
 constexpr double kControlCost = 0.05;
 constexpr double kStartSpread = 0.1;

@@ -8,6 +8,8 @@
 namespace pmeta {
 namespace {
 
+const RegisteredFamily<MountainCarFamily> kMountainCar("mountain_car");
+
 constexpr double kLowestPosition = -1.2;
 constexpr double kHighestPosition = 0.6;
 constexpr double kHighestSpeed = 0.07;

@@ -11,6 +11,8 @@
 namespace pmeta {
 namespace {
 
+const RegisteredFamily<SparsePointFamily> kSparsePoint("sparse_point_robot");
+
 constexpr char kName[] = "sparse_point_robot";
 constexpr double kLongestMove = 0.1;  ///< along each axis
 constexpr double kPi = 3.141592653589793;

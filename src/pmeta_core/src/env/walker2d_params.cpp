@@ -11,6 +11,8 @@
 namespace pmeta {
 namespace {
 
+const RegisteredFamily<Walker2dParamsFamily> kWalker2dParams("walker_2d_params");
+
 constexpr double kScale = 3;  ///< the logarithms of the factors reach from -3 to 3
 constexpr double kDampingBase = 1.3;
 constexpr double kBase = 1.5;

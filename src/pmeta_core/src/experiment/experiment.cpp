@@ -263,7 +263,7 @@ void Experiment::bind(Settings& s, const std::string& learner) {
          "there are three or more; 0: none is",
          Range::atLeast(0));
 
-  s.bind("environment.name", e.environment, "family of environments", envFamilyNames());
+  s.bind("environment.name", e.environment, "family of environments", envFamilies().names());
   family_->bind(s);
 }
 
@@ -300,8 +300,8 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   const std::vector<YAML::Node> files = choosePreset(root, source, overrides);
   Experiment experiment;
   const std::string learner = peek(files, overrides, "", "learner", experiment.settings_.learner);
-  experiment.family_ = makeEnvFamily(
-      peek(files, overrides, "environment", "name", experiment.settings_.environment));
+  experiment.family_ = envFamilies().at(
+      peek(files, overrides, "environment", "name", experiment.settings_.environment))();
 
   Settings settings;
   experiment.bind(settings, learner);
@@ -358,7 +358,7 @@ void Experiment::copyModel() const {
 
 std::string Experiment::describe() const {
   Experiment defaults;
-  defaults.family_ = makeEnvFamily(settings_.environment);
+  defaults.family_ = envFamilies().at(settings_.environment)();
   Settings settings;
   defaults.bind(settings, settings_.learner);
   settings.read(parseYaml(yaml_, "the settings"), "the settings");

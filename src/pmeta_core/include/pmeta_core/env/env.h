@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/registry.h"
 #include "pmeta_core/base/rng.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/base/state.h"
@@ -124,10 +125,19 @@ class EnvFamily {
 std::vector<std::unique_ptr<Env>> makeEnvs(const std::function<std::unique_ptr<Env>(int k)>& make,
                                            int count);
 
-/// The family of that name, with its default settings. Throws Error listing the known names.
-std::unique_ptr<EnvFamily> makeEnvFamily(const std::string& name);
+/// Makes a family with its default settings.
+using EnvFamilyMaker = std::function<std::unique_ptr<EnvFamily>()>;
 
-/// Names that makeEnvFamily knows.
-std::vector<std::string> envFamilyNames();
+/// Every family, by the name that `environment.name` gives.
+Registry<EnvFamilyMaker>& envFamilies();
+
+/// In the source of a family, outside of any function:
+///
+///     const RegisteredFamily<CartPoleFamily> kCartPole("cart_pole");
+template <class Family>
+struct RegisteredFamily : Registered<EnvFamilyMaker> {
+  explicit RegisteredFamily(const std::string& name)
+      : Registered(envFamilies(), name, [] { return std::make_unique<Family>(); }) {}
+};
 
 }  // namespace pmeta

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/settings.h"
+
+namespace pmeta {
+
+/// What there is of one kind (learners, environments, ...), by name. Each row stands beside the
+/// code that it makes known, as a `const Registered<Row>` outside of any function; a library that
+/// is loaded later adds its rows then.
+template <class Row>
+class Registry {
+ public:
+  /// `kind`: what a row is, for errors, e.g. "environment".
+  explicit Registry(std::string kind) : kind_(std::move(kind)) {}
+
+  /// Throws std::logic_error if the name is taken.
+  void add(const std::string& name, Row row) {
+    if (!rows_.emplace(name, std::move(row)).second) {
+      throw std::logic_error("two of kind " + kind_ + " have the name '" + name + "'");
+    }
+  }
+
+  /// Throws Error if there is none of that name, with the known names and the nearest.
+  const Row& at(const std::string& name) const {
+    const auto found = rows_.find(name);
+    if (found != rows_.end()) return found->second;
+    const std::string guess = nearest(name, names());
+    throw Error("unknown " + kind_ + " '" + name + "'" +
+                (guess.empty() ? "." : ": did you mean '" + guess + "'?") + " Known are " +
+                join(names()) + ".");
+  }
+
+  /// Ascending.
+  std::vector<std::string> names() const {
+    std::vector<std::string> names;
+    for (const auto& row : rows_) names.push_back(row.first);
+    return names;
+  }
+
+ private:
+  std::string kind_;
+  std::map<std::string, Row> rows_;
+};
+
+/// A row that is in a registry from the program's (or library's) start on.
+template <class Row>
+struct Registered {
+  Registered(Registry<Row>& registry, const std::string& name, Row row) {
+    registry.add(name, std::move(row));
+  }
+};
+
+}  // namespace pmeta
