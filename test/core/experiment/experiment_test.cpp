@@ -6,6 +6,7 @@
 
 #include "../support.h"
 #include "pmeta_core/env/mountain_car.h"
+#include "pmeta_core/experiment/results_dir.h"
 #include "pmeta_core/personal/dqn_personal_learner.h"
 
 namespace pmeta {
@@ -28,7 +29,7 @@ TEST(Experiment, PmetaTakesItsSettingsAsTheyStand) {
   EXPECT_EQ(e.settings().personal.lambda, 10);
   EXPECT_EQ(e.settings().personal.personal_init, "meta");
   EXPECT_EQ(e.settings().aggregation.beta, 1);
-  EXPECT_FALSE(e.sendsPersonal());
+  EXPECT_EQ(e.algorithm().sent, Sent::kAuxiliary);
   EXPECT_TRUE(e.evaluatesMeta());
   EXPECT_FALSE(e.keepsPersonal());
   EXPECT_EQ(e.notes(), Notes{});
@@ -60,7 +61,7 @@ TEST(Experiment, WhatCannotBeLearntOrHeldNamesItsSettings) {
 TEST(Experiment, ModelAveragingIsSettings) {
   const Experiment e = gridExperiment({"algorithm:=model_averaging", "personal_init:=keep"});
   EXPECT_EQ(e.settings().personal.lambda, 0);
-  EXPECT_TRUE(e.sendsPersonal());
+  EXPECT_EQ(e.algorithm().sent, Sent::kPersonal);
   EXPECT_TRUE(e.evaluatesMeta());
   EXPECT_FALSE(e.keepsPersonal());
   EXPECT_EQ(e.settings().aggregation.beta, 1);
@@ -149,18 +150,34 @@ TEST(Experiment, ValuesOutOfRangeAreRefused) {
   EXPECT_EQ(refused({"rounds:=0"}),
             "rounds is '0' (given as rounds:=0) but must be a whole number, from 1 to 1e+06.");
   EXPECT_EQ(refused({"algorithm:=maml"}),
-            "algorithm is 'maml' (given as algorithm:=maml) but must be one of pmeta, "
-            "model_averaging, independent, pooled.");
+            "algorithm is 'maml' (given as algorithm:=maml) but must be one of "
+            "independent, model_averaging, pmeta, pooled.");
   EXPECT_EQ(refused({"quorum:=6"}),
             "aggregation.quorum is 6 but there are 5 tasks: give at most that, or 0 for all.");
 }
 
+// what the experiment's rule makes of five contributions of one entry: 0, 1, 2, 6 and 91
+double mixed(const std::vector<std::string>& overrides) {
+  std::vector<Model> models;
+  for (const float value : {0.0f, 1.0f, 2.0f, 6.0f, 91.0f}) {
+    models.emplace_back();
+    models.back().layout = ModelLayout(Precision::kFloat32, {Block{"w", {1}}});
+    models.back().values = std::vector<float>{value};
+  }
+  std::vector<Contribution> contributions;
+  for (const Model& model : models) contributions.push_back({&model, 1});
+  Model meta = models.front();
+  gridExperiment(overrides).rule()->mix(meta, contributions, 1);
+  return std::get<std::vector<float>>(meta.values).front();
+}
+
 TEST(Experiment, RobustAggregationIsSettings) {
-  EXPECT_EQ(gridExperiment().trim(), 0);
-  EXPECT_EQ(gridExperiment({"trim:=0.3"}).trim(), 0) << "the mean cuts nothing";
-  EXPECT_EQ(gridExperiment({"rule:=trimmed_mean"}).trim(), 0.2);
-  EXPECT_EQ(gridExperiment({"rule:=trimmed_mean", "trim:=0.3"}).trim(), 0.3);
-  EXPECT_EQ(gridExperiment({"rule:=median"}).trim(), 0.5);
+  EXPECT_EQ(mixed({}), 20);
+  EXPECT_EQ(mixed({"trim:=0.3"}), 20) << "the mean cuts nothing";
+  EXPECT_EQ(mixed({"rule:=trimmed_mean"}), 3);
+  EXPECT_EQ(mixed({"rule:=trimmed_mean", "trim:=0.1"}), 20);
+  EXPECT_EQ(mixed({"rule:=trimmed_mean", "beta:=0.5"}), 3) << "mixing is the aggregator's";
+  EXPECT_EQ(mixed({"rule:=median"}), 2);
   EXPECT_EQ(refused({"rule:=median", "catch_up:=2"}),
             "aggregation.rule median counts all tasks the same but aggregation.catch_up is 2: set "
             "catch_up to 0, or rule to mean.");

@@ -17,15 +17,16 @@
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/process.h"
 #include "pmeta_core/base/settings.h"
-#include "pmeta_core/verify/model_check.h"
-#include "pmeta_core/verify/trajectory_check.h"
-#include "pmeta_core/security/authentication.h"
+#include "pmeta_core/experiment/results_dir.h"
 #include "pmeta_core/run/console.h"
-#include "pmeta_core/security/key_file.h"
 #include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/run/local_runner.h"
 #include "pmeta_core/run/sweep.h"
+#include "pmeta_core/security/authentication.h"
+#include "pmeta_core/security/key_file.h"
 #include "pmeta_core/theory/convergence.h"
+#include "pmeta_core/verify/model_check.h"
+#include "pmeta_core/verify/trajectory_check.h"
 
 namespace {
 

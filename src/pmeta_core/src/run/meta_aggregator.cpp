@@ -3,8 +3,6 @@
 #include <cmath>
 #include <iterator>
 
-#include "pmeta_core/aggregate/mix.h"
-#include "pmeta_core/aggregate/trimmed_mix.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/run/divergence.h"
@@ -14,7 +12,7 @@ namespace pmeta {
 MetaAggregator::MetaAggregator(const Experiment& experiment)
     : rounds_(experiment.settings().rounds),
       settings_(experiment.settings().aggregation),
-      trim_(experiment.trim()),
+      rule_(experiment.rule()),
       bound_{settings_.max_update_norm, settings_.outlier_factor},
       quorum_(experiment.quorum()),
       updates_(experiment.numTasks()),
@@ -89,7 +87,7 @@ std::string MetaAggregator::refusal(const AuxiliaryUpdate& update) const {
   if (!(update.weight > 0) || update.weight > 1e12) {
     return who + " has weight " + formatNumber(update.weight) + ", which is not a positive number.";
   }
-  if (settings_.rule != "mean" && update.weight != 1) {
+  if (!rule_->weighted() && update.weight != 1) {
     return who + " has weight " + formatNumber(update.weight) + " but aggregation.rule " +
            settings_.rule + " counts all tasks the same: start it with the same configuration.";
   }
@@ -132,11 +130,7 @@ std::vector<int> MetaAggregator::closeRound() {
   for (const int task : meta_.participants) {
     contributions.push_back({&updates_[task]->model, updates_[task]->weight});
   }
-  if (settings_.rule == "mean") {
-    mixInto(meta_.model, contributions, settings_.beta);
-  } else {
-    mixTrimmedInto(meta_.model, contributions, settings_.beta, trim_);
-  }
+  rule_->mix(meta_.model, contributions, settings_.beta);
   ++meta_.round;
   for (auto& update : updates_) update.reset();
   return absent;

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/experiment/results_dir.h"
 #include "pmeta_core/run/local_runner.h"
 
 namespace pmeta {

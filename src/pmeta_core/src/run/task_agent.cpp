@@ -37,7 +37,7 @@ TaskAgent::TaskAgent(const Experiment& experiment, int task)
       split_(experiment.isTestTask(task) ? Split::kTest : Split::kTrain),
       updates_per_round_(experiment.settings().updates_per_round),
       keeps_personal_(experiment.keepsPersonal()),
-      sends_personal_(experiment.sendsPersonal()),
+      sends_personal_(experiment.algorithm().sent == Sent::kPersonal),
       evaluations_(experiment.evaluationSchedule()),
       catch_up_(experiment.settings().aggregation.catch_up),
       learner_(experiment.makeLearner(task)) {}

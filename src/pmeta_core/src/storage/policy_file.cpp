@@ -10,6 +10,7 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/file.h"
+#include "pmeta_core/experiment/results_dir.h"
 #include "pmeta_core/storage/run_log.h"
 
 namespace pmeta {

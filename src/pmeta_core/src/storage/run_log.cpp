@@ -17,6 +17,7 @@
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/number.h"
 #include "pmeta_core/base/version.h"
+#include "pmeta_core/experiment/results_dir.h"
 #include "pmeta_core/nn/machine.h"
 
 namespace pmeta {

@@ -10,6 +10,7 @@
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/base/version.h"
 #include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/experiment/results_dir.h"
 #include "pmeta_core/storage/run_log.h"
 #include "pmeta_core/theory/convergence.h"
 

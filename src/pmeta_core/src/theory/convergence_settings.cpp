@@ -1,6 +1,7 @@
 #include "convergence_tasks.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/experiment/results_dir.h"
 #include "pmeta_core/theory/convergence.h"
 
 namespace pmeta {

@@ -19,8 +19,9 @@
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/process.h"
-#include "pmeta_core/security/authentication.h"
 #include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/experiment/results_dir.h"
+#include "pmeta_core/security/authentication.h"
 #include "pmeta_core/storage/run_log.h"
 
 namespace {

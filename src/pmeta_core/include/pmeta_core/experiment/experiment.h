@@ -8,61 +8,18 @@
 #include <string>
 #include <vector>
 
+#include "pmeta_core/aggregate/aggregation_rule.h"
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/env/env.h"
-#include "pmeta_core/learn/dqn.h"
-#include "pmeta_core/learn/sac_settings.h"
+#include "pmeta_core/experiment/algorithm.h"
+#include "pmeta_core/experiment/experiment_settings.h"
 #include "pmeta_core/personal/personal_learner.h"
-#include "pmeta_core/personal/tabular_personal_learner.h"
 
 namespace pmeta {
 
-/// How the meta-aggregator mixes and how long it waits.
-struct AggregationSettings {
-  double beta = 1;             ///< mixing: meta <- (1 - beta) meta + beta mean
-  int quorum = 0;              ///< updates that suffice once round_timeout has passed; 0 means all
-  double round_timeout = 30;   ///< seconds before a round counts as late
-  double catch_up = 0;         ///< how much more tasks count on which the meta-policy lags
-  std::string rule = "mean";   ///< mean, median or trimmed_mean of each entry
-  double trim = 0.2;           ///< with trimmed_mean: share of values cut at each end
-  double max_update_norm = 0;  ///< updates further from the meta-policy are left out; 0: none
-  double outlier_factor = 0;   ///< as are those of more than this times the median; 0: none
-};
-
-/// The rounds in which policies are evaluated: every `interval`-th, and the last.
-struct EvaluationSchedule {
-  int interval = 1;
-  int rounds = 1;  ///< C
-
-  bool includes(int round) const { return round % interval == 0 || round == rounds; }
-};
-
-/// Everything that defines a run, with defaults.
-struct ExperimentSettings {
-  std::string experiment = "experiment";
-  std::string preset;                  ///< which of the file's presets; "" for none
-  std::string algorithm = "pmeta";     ///< pmeta, model_averaging, independent or pooled
-  std::string learner = "q_learning";  ///< q_learning (tables), dqn or sac (networks)
-  std::string arithmetic = "native";   ///< of networks: native or portable
-  std::int64_t seed = 0;
-  int rounds = 10;              ///< C
-  int updates_per_round = 3;    ///< R
-  int evaluation_interval = 1;  ///< rounds from one evaluation to the next
-  std::string results_dir;      ///< "" means $ROS_HOME/pmeta, by default ~/.ros/pmeta
-  std::string run_id;           ///< "" means one made of the start time, algorithm and seed
-  double pace = 0;              ///< least seconds between rounds, to watch a fast experiment
-  bool publish_trajectories = true;
-  int checkpoint_interval = 0;  ///< rounds from one checkpoint to the next; 0: none
-  std::string key_file;         ///< of the key that messages are authenticated with; "" for none
-  int fresh_episodes = 0;       ///< local runner: episodes of the evaluation after the last round
-  PersonalSettings personal;
-  QLearningSettings q_learning;  ///< with learner q_learning
-  DqnSettings dqn;               ///< with learner dqn
-  SacSettings sac;               ///< with learner sac
-  AggregationSettings aggregation;
-  std::string environment = "gridworld";
-};
+/// Of the model files that a run depends on, in its folder.
+inline constexpr char kModelsFolder[] = "models";
 
 /// A checked experiment: its settings, its tasks, and what each party needs of them.
 ///
@@ -70,12 +27,7 @@ struct ExperimentSettings {
 /// that one over the rest. What is read of a file depends on `learner` and `environment.name`:
 /// settings of others are unknown keys.
 ///
-/// The algorithms are settings, not code paths of their own:
-///   pmeta            personal pull lambda, agents send auxiliary parameters
-///   model_averaging  lambda = 0, agents send their personal parameters
-///   independent      lambda = 0, personal parameters kept, beta = 0: nothing comes back
-///   pooled           independent, but each agent trains in environments of all tasks, as if
-///                    trajectories were shared (learner dqn); it is evaluated on its own task
+/// The algorithms are settings, not code paths of their own: see Algorithm.
 class Experiment {
  public:
   /// Reads a settings file and applies "key:=value" overrides. Throws Error.
@@ -103,18 +55,16 @@ class Experiment {
   int totalTasks() const { return numTasks() + numTestTasks(); }
   bool isTestTask(int task) const { return task >= numTasks(); }
 
-  bool sendsPersonal() const { return settings_.algorithm != "pmeta"; }
-  bool evaluatesMeta() const {
-    return settings_.algorithm == "pmeta" || settings_.algorithm == "model_averaging";
-  }
+  const Algorithm& algorithm() const { return *algorithm_; }
+  bool evaluatesMeta() const { return algorithm_->shares; }
   bool keepsPersonal() const { return settings_.personal.personal_init == "keep"; }
   EvaluationSchedule evaluationSchedule() const {
     return {settings_.evaluation_interval, settings_.rounds};
   }
   int quorum() const;  ///< updates needed once the deadline has passed
-  /// The share of an entry's values that aggregation.rule cuts at each end: 0 for the mean, 0.5 for
-  /// the median.
-  double trim() const;
+  std::shared_ptr<const AggregationRule> rule() const {
+    return rules_.at(settings_.aggregation.rule);
+  }
 
   /// How many exploration episodes the meta-policy is evaluated after, ascending; {0} without an
   /// inference network.
@@ -165,7 +115,7 @@ class Experiment {
     std::vector<std::optional<double>> returns;  // of each task
   };
 
-  Experiment() = default;
+  Experiment();
   static Experiment build(const YAML::Node& root, const std::string& source,
                           const std::vector<std::string>& overrides, const std::string& folder);
   void anchorPaths(const std::string& folder);
@@ -178,6 +128,8 @@ class Experiment {
   void checkStability();
 
   ExperimentSettings settings_;
+  const Algorithm* algorithm_ = nullptr;
+  std::map<std::string, std::shared_ptr<AggregationRule>> rules_;  // with their settings
   std::shared_ptr<EnvFamily> family_;
   std::shared_ptr<Optima> optima_ = std::make_shared<Optima>();
   std::string yaml_;
@@ -189,15 +141,5 @@ class Experiment {
 /// The first key that only one of both has, or has with another value; "" if they are equal.
 std::string firstDifference(const std::map<std::string, std::string>& a,
                             const std::map<std::string, std::string>& b);
-
-/// "~" and "" expanded: where results go by default, see ExperimentSettings::results_dir.
-std::string expandResultsDir(const std::string& results_dir);
-
-/// Creates `dir` if need be and proves that a file can be written there; throws Error.
-void requireWritable(const std::string& dir);
-
-/// UTC time as 20261122T061203, for names; or 2026-11-22T06:12:03Z, for people.
-std::string utcStamp();
-std::string utcTime();
 
 }  // namespace pmeta

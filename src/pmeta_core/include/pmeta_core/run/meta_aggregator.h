@@ -86,7 +86,7 @@ class MetaAggregator {
 
   int rounds_;
   AggregationSettings settings_;
-  double trim_;
+  std::shared_ptr<const AggregationRule> rule_;
   NormBound bound_;
   int quorum_;
   MetaPolicy meta_;

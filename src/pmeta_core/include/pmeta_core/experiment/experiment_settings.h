@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "pmeta_core/learn/dqn.h"
+#include "pmeta_core/learn/sac_settings.h"
+#include "pmeta_core/personal/personal_settings.h"
+#include "pmeta_core/personal/tabular_personal_learner.h"
+
+namespace pmeta {
+
+/// How the meta-aggregator mixes and how long it waits.
+struct AggregationSettings {
+  double beta = 1;             ///< mixing: meta <- (1 - beta) meta + beta mean
+  int quorum = 0;              ///< updates that suffice once round_timeout has passed; 0 means all
+  double round_timeout = 30;   ///< seconds before a round counts as late
+  double catch_up = 0;         ///< how much more tasks count on which the meta-policy lags
+  std::string rule = "mean";   ///< a name of aggregationRules()
+  double max_update_norm = 0;  ///< updates further from the meta-policy are left out; 0: none
+  double outlier_factor = 0;   ///< as are those of more than this times the median; 0: none
+};
+
+/// The rounds in which policies are evaluated: every `interval`-th, and the last.
+struct EvaluationSchedule {
+  int interval = 1;
+  int rounds = 1;  ///< C
+
+  bool includes(int round) const { return round % interval == 0 || round == rounds; }
+};
+
+/// Everything that defines a run, with defaults.
+struct ExperimentSettings {
+  std::string experiment = "experiment";
+  std::string preset;                  ///< which of the file's presets; "" for none
+  std::string algorithm = "pmeta";     ///< a name of algorithms()
+  std::string learner = "q_learning";  ///< q_learning (tables), dqn or sac (networks)
+  std::string arithmetic = "native";   ///< of networks: native or portable
+  std::int64_t seed = 0;
+  int rounds = 10;              ///< C
+  int updates_per_round = 3;    ///< R
+  int evaluation_interval = 1;  ///< rounds from one evaluation to the next
+  std::string results_dir;      ///< "" means $ROS_HOME/pmeta, by default ~/.ros/pmeta
+  std::string run_id;           ///< "" means one made of the start time, algorithm and seed
+  double pace = 0;              ///< least seconds between rounds, to watch a fast experiment
+  bool publish_trajectories = true;
+  int checkpoint_interval = 0;  ///< rounds from one checkpoint to the next; 0: none
+  std::string key_file;         ///< of the key that messages are authenticated with; "" for none
+  int fresh_episodes = 0;       ///< local runner: episodes of the evaluation after the last round
+  PersonalSettings personal;
+  QLearningSettings q_learning;  ///< with learner q_learning
+  DqnSettings dqn;               ///< with learner dqn
+  SacSettings sac;               ///< with learner sac
+  AggregationSettings aggregation;
+  std::string environment = "gridworld";
+};
+
+}  // namespace pmeta

@@ -1,0 +1,64 @@
+// The algorithms that come with the suite.
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/experiment/algorithm.h"
+
+namespace pmeta {
+
+Registry<Algorithm>& algorithms() {
+  static Registry<Algorithm> algorithms("algorithm");
+  return algorithms;
+}
+
+namespace {
+
+using Row = Registered<Algorithm>;
+
+Algorithm pmeta() {
+  Algorithm row;
+  row.label = "pMeta-RL";
+  row.meaning = "personal policies, pulled towards auxiliary parameters, which are aggregated";
+  row.sent = Sent::kAuxiliary;
+  row.pulls = true;
+  return row;
+}
+
+Algorithm modelAveraging() {
+  Algorithm row;
+  row.label = "model averaging";
+  row.meaning = "the personal parameters themselves are aggregated";
+  return row;
+}
+
+Algorithm independent() {
+  Algorithm row;
+  row.label = "independent";
+  row.meaning = "each robot for itself";
+  row.shares = false;
+  return row;
+}
+
+Algorithm pooled() {
+  Algorithm row;
+  row.label = "pooled";
+  row.meaning = "each robot for itself, in environments of all tasks";
+  row.shares = false;
+  row.pools_environments = true;
+  row.check = [](const ExperimentSettings& settings, int num_tasks) {
+    if (settings.learner != "dqn") {
+      throw Error("algorithm pooled needs learner dqn, which trains in several environments.");
+    }
+    if (settings.dqn.num_envs < num_tasks) {
+      throw Error("algorithm pooled needs at least one environment a task: set dqn.num_envs to " +
+                  std::to_string(num_tasks) + " or more.");
+    }
+  };
+  return row;
+}
+
+const Row kPmeta(algorithms(), "pmeta", pmeta());
+const Row kModelAveraging(algorithms(), "model_averaging", modelAveraging());
+const Row kIndependent(algorithms(), "independent", independent());
+const Row kPooled(algorithms(), "pooled", pooled());
+
+}  // namespace
+}  // namespace pmeta

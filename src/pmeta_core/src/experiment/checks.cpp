@@ -1,0 +1,87 @@
+// What speaks against settings that are each allowed.
+#include <cmath>
+
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
+#include "pmeta_core/experiment/algorithm.h"
+#include "pmeta_core/experiment/experiment.h"
+
+namespace pmeta {
+namespace {
+
+// six digits, so that a limit that is named is allowed
+std::string roundedDown(double value) {
+  const double scale = std::pow(10.0, 5 - std::floor(std::log10(value)));
+  return formatNumber(std::floor(value * scale) / scale);
+}
+
+}  // namespace
+
+void Experiment::applyAlgorithm() {
+  ExperimentSettings& e = settings_;
+  if (algorithm_->check) algorithm_->check(e, numTasks());
+  if (algorithm_->pulls) return;
+  const std::string init = evaluatesMeta() ? "meta" : "keep";
+  std::vector<std::string> changes;
+  if (e.personal.lambda != 0) changes.push_back("personal.lambda to 0");
+  if (e.personal.personal_init != init) changes.push_back("personal.personal_init to " + init);
+  e.personal.lambda = 0;
+  e.personal.lambda_actor = e.personal.lambda_critic = e.personal.lambda_encoder = -1;
+  e.personal.personal_init = init;
+  if (!evaluatesMeta()) {
+    if (e.aggregation.beta != 0) changes.push_back("aggregation.beta to 0");
+    e.aggregation.beta = 0;
+  }
+  if (!changes.empty())
+    notes_.push_back("algorithm " + e.algorithm + " sets " + join(changes) + ".");
+}
+
+void Experiment::checkAggregation() const {
+  const AggregationSettings& a = settings_.aggregation;
+  if (!rule()->weighted() && a.catch_up > 0) {
+    throw Error("aggregation.rule " + a.rule + " counts all tasks the same but " +
+                "aggregation.catch_up is " + formatNumber(a.catch_up) +
+                ": set catch_up to 0, or rule to mean.");
+  }
+  if (a.outlier_factor > 0 && a.outlier_factor < 1) {
+    throw Error("aggregation.outlier_factor is " + formatNumber(a.outlier_factor) +
+                " but must be at least 1, or 0 to leave none out.");
+  }
+}
+
+void Experiment::checkStability() {
+  const PersonalSettings& p = settings_.personal;
+  for (const double lambda : {p.lambda_actor, p.lambda_critic, p.lambda_encoder}) {
+    if (lambda < 0 && lambda != -1) {
+      throw Error("a lambda of a network's own is " + formatNumber(lambda) +
+                  " but must be at least 0, or -1 for that of all.");
+    }
+  }
+  const bool tabular = settings_.learner == "q_learning";
+  // with frozen auxiliary parameters the update is a linear map that blows up beyond these; of a
+  // network only the pull is linear
+  const double own = tabular ? 1 + settings_.q_learning.gamma : 0;
+  const std::string formula = tabular ? "2 / (1 + lambda + gamma)" : "2 / lambda";
+  if (p.alpha * (own + p.lambda) >= 2) {
+    throw Error("personal.alpha = " + formatNumber(p.alpha) + " with personal.lambda = " +
+                formatNumber(p.lambda) + " diverges: alpha must be below " + formula + " = " +
+                roundedDown(2 / (own + p.lambda)) + ".");
+  }
+  if (p.eta * p.lambda >= 2) {
+    throw Error("personal.eta = " + formatNumber(p.eta) +
+                " with personal.lambda = " + formatNumber(p.lambda) +
+                " diverges: eta must be below 2 / lambda = " + formatNumber(2 / p.lambda) + ".");
+  }
+  const double overshoot = p.alpha * ((tabular ? 1 : 0) + p.lambda);
+  if (overshoot > 1) {
+    notes_.push_back("warning: alpha * " + std::string(tabular ? "(1 + lambda)" : "lambda") +
+                     " = " + formatNumber(overshoot) +
+                     " is above 1: the personalised update overshoots.");
+  }
+  if (p.eta * p.lambda > 1) {
+    notes_.push_back("warning: eta * lambda = " + formatNumber(p.eta * p.lambda) +
+                     " is above 1: the auxiliary update overshoots.");
+  }
+}
+
+}  // namespace pmeta

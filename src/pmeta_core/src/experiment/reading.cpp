@@ -1,0 +1,171 @@
+// From settings files, presets and overrides to an Experiment.
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
+#include "pmeta_core/env/model_files.h"
+#include "pmeta_core/experiment/algorithm.h"
+#include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/experiment/results_dir.h"
+
+namespace pmeta {
+namespace {
+
+// what the file or an override says of a setting that decides which others there are; `fallback` if
+// neither does. The last one given counts; what is wrong with it is said when it is read in
+// earnest.
+std::string peek(const std::vector<YAML::Node>& files, const std::vector<std::string>& overrides,
+                 const std::string& section, const std::string& name, std::string fallback) {
+  for (const YAML::Node& file : files) {
+    const YAML::Node group = section.empty() ? file : file[section];
+    if (group && group.IsMap() && group[name] && group[name].IsScalar()) {
+      fallback = group[name].Scalar();
+    }
+  }
+  const std::string full = section.empty() ? name : section + "." + name;
+  for (const std::string& assignment : overrides) {
+    const auto split = assignment.find(":=");
+    const std::string key = assignment.substr(0, split);
+    if (split == std::string::npos || (key != full && key != name)) continue;
+    try {
+      const YAML::Node value = YAML::Load(assignment.substr(split + 2));
+      if (value.IsScalar()) fallback = value.Scalar();
+    } catch (const YAML::Exception&) {
+      // Settings::assign says what is wrong with it
+    }
+  }
+  return fallback;
+}
+
+// the file without its presets, then the chosen preset
+std::vector<YAML::Node> choosePreset(YAML::Node base, const std::string& source,
+                                     const std::vector<std::string>& overrides) {
+  const std::string chosen = peek({base}, overrides, "", "preset", "");
+  const YAML::Node presets = base["presets"];
+  // taken out in place: a clone would forget its line numbers
+  base.remove("presets");
+  // effective settings name the preset they came from, which is part of them already
+  if (chosen.empty() || (!presets && peek({base}, {}, "", "preset", "") == chosen)) return {base};
+  std::vector<std::string> known;
+  if (presets && presets.IsMap()) {
+    for (const auto& preset : presets) known.push_back(preset.first.Scalar());
+    if (presets[chosen]) return {base, presets[chosen]};
+  }
+  throw Error("unknown preset '" + chosen + "': " + source +
+              (known.empty() ? " has none." : " has " + join(known) + "."));
+}
+
+}  // namespace
+
+Experiment Experiment::load(const std::string& path, const std::vector<std::string>& overrides) {
+  namespace fs = std::filesystem;
+  // of a pipe, as of <(...), the folder says nothing
+  const bool is_file = fs::is_regular_file(path);
+  return build(loadYamlFile(path), path, overrides,
+               is_file ? fs::absolute(path).parent_path().string() : "");
+}
+
+Experiment Experiment::parse(const std::string& text, const std::string& source,
+                             const std::vector<std::string>& overrides, const std::string& folder) {
+  return build(parseYaml(text, source), source, overrides, folder);
+}
+
+Experiment Experiment::resume(const std::string& run_dir, const std::vector<std::string>& overrides,
+                              const std::string& of_config) {
+  namespace fs = std::filesystem;
+  // the folder itself, whatever link leads to it
+  const fs::path dir = (fs::weakly_canonical(run_dir) / "").lexically_normal().parent_path();
+  const std::string config = (dir / "config.yaml").string();
+  if (!fs::exists(config)) {
+    throw Error("there is no run to resume in " + dir.string() + ": it has no config.yaml.");
+  }
+  // where the folder is now
+  const std::string place = "results_dir:=" + dir.parent_path().parent_path().string();
+  const Experiment saved = load(config, {place});
+  if (fs::path(saved.runDir()).lexically_normal() != dir) {
+    throw Error("the run folder " + dir.string() + " must be <results_dir>/" +
+                saved.settings().experiment + "/" + saved.settings().run_id +
+                ", as its config.yaml names it.");
+  }
+  const std::string name = saved.settings().experiment;
+  if (!of_config.empty() && load(of_config).settings().experiment != name) {
+    throw Error("the run in " + dir.string() + " is of experiment '" + name + "', not of " +
+                of_config + ": give its own settings file.");
+  }
+  std::vector<std::string> changed = overrides;
+  changed.push_back(place);
+  Experiment experiment = load(config, changed);
+  const std::string key = firstDifference(saved.definingSettings(), experiment.definingSettings());
+  if (!key.empty()) {
+    throw Error(key + " cannot be changed in a run that goes on: resume " + dir.string() +
+                " without it, or begin a new run.");
+  }
+  return experiment;
+}
+
+void Experiment::anchorPaths(const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::vector<std::string*> paths = {&settings_.results_dir, &settings_.key_file};
+  if (ModelChoice* model = family_->model()) paths.push_back(&model->file);
+  for (std::string* path : paths) {
+    if (path->empty() || path->front() == '~') continue;
+    *path = ((folder.empty() ? fs::current_path() : fs::path(folder)) / *path).string();
+  }
+}
+
+Experiment Experiment::build(const YAML::Node& root, const std::string& source,
+                             const std::vector<std::string>& overrides, const std::string& folder) {
+  const std::vector<YAML::Node> files = choosePreset(root, source, overrides);
+  Experiment experiment;
+  const std::string learner = peek(files, overrides, "", "learner", experiment.settings_.learner);
+  experiment.family_ = envFamilies().at(
+      peek(files, overrides, "environment", "name", experiment.settings_.environment))();
+
+  Settings settings;
+  experiment.bind(settings, learner);
+  for (const YAML::Node& file : files) settings.read(file, source);
+  experiment.anchorPaths(folder);
+  for (const std::string& assignment : overrides) settings.assign(assignment);
+  experiment.anchorPaths("");
+
+  ExperimentSettings& e = experiment.settings_;
+  requirePlainName("experiment", e.experiment);
+  if (!e.run_id.empty()) requirePlainName("run_id", e.run_id);
+  ModelChoice* model = experiment.family_->model();
+  const bool own_model = model != nullptr && !model->file.empty();
+  if (own_model) model->file = absolutePath("environment.model_file", model->file);
+  experiment.family_->build(static_cast<std::uint64_t>(e.seed));
+  if (e.aggregation.quorum > experiment.numTasks()) {
+    throw Error("aggregation.quorum is " + std::to_string(e.aggregation.quorum) +
+                " but there are " + std::to_string(experiment.numTasks()) +
+                " tasks: give at most that, or 0 for all.");
+  }
+  const std::vector<int>& counts = e.sac.context.exploration_episodes;
+  if (std::adjacent_find(counts.begin(), counts.end(), std::greater_equal<int>()) != counts.end()) {
+    throw Error("sac.exploration_episodes must be ascending, e.g. [5, 15].");
+  }
+  experiment.algorithm_ = &algorithms().at(e.algorithm);
+  experiment.applyAlgorithm();
+  experiment.checkAggregation();
+  experiment.checkStability();
+  e.dqn.portable = e.sac.portable = e.sac.context.portable = e.arithmetic == "portable";
+  experiment.checkSampling();
+  e.results_dir = expandResultsDir(e.results_dir);
+  if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
+  if (e.run_id.empty()) {
+    e.run_id = utcStamp() + "_" + e.algorithm + "_seed" + std::to_string(e.seed);
+  }
+  experiment.yaml_ = experiment.run_yaml_ = settings.yaml();
+  if (own_model) {
+    const std::string file = model->file;
+    model->file = std::string(kModelsFolder) + "/" + ModelFiles::find(file).names.front();
+    experiment.run_yaml_ = settings.yaml();
+    model->file = file;
+  }
+  experiment.table_ = settings.table();
+  return experiment;
+}
+
+}  // namespace pmeta
