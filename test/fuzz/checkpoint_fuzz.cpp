@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "../core/memory_state.h"
-#include "../core/run/checkpoint_experiments.h"
+#include "../core/storage/checkpoint_experiments.h"
 #include "fuzz_support.h"
 #include "pmeta_core/storage/checkpoint.h"
 #include "pmeta_core/run/meta_aggregator.h"

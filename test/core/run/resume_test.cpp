@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "../support.h"
-#include "checkpoint_experiments.h"
+#include "storage/checkpoint_experiments.h"
 #include "pmeta_core/storage/checkpoint.h"
 #include "pmeta_core/run/local_runner.h"
 #include "pmeta_core/storage/policy_file.h"

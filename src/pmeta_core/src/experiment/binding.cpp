@@ -8,6 +8,9 @@ void Experiment::bind(Settings& s, const std::string& learner) {
   ExperimentSettings& e = settings_;
   s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
   s.bind("preset", e.preset, "variant of the settings file; \"\" for none");
+  s.bind("library", e.library,
+         "shared library whose environments, learners, algorithms, rules and scenes are added to "
+         "those of the suite; \"\" for none");
   s.bind("algorithm", e.algorithm, "what is trained", algorithms().names());
   s.bind("learner", e.learner,
          "q_learning for tables, dqn for networks, sac for networks with continuous actions",

@@ -19,7 +19,7 @@ std::map<std::string, std::string> Experiment::definingSettings(const std::strin
   // of a model its hash counts, not where it is
   for (const char* key :
        {"results_dir", "pace", "publish_trajectories", "key_file", "checkpoint.interval",
-        "aggregation.round_timeout", "environment.model_file"}) {
+        "aggregation.round_timeout", "environment.model_file", "library"}) {
     settings.erase(key);
   }
   return settings;

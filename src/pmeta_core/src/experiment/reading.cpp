@@ -5,6 +5,7 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
+#include "pmeta_core/base/library.h"
 #include "pmeta_core/env/model_files.h"
 #include "pmeta_core/experiment/algorithm.h"
 #include "pmeta_core/experiment/experiment.h"
@@ -57,6 +58,13 @@ std::vector<YAML::Node> choosePreset(YAML::Node base, const std::string& source,
               (known.empty() ? " has none." : " has " + join(known) + "."));
 }
 
+// a path that is relative is so to the folder, or to the working folder if that is ""
+std::string anchored(const std::string& path, const std::string& folder) {
+  namespace fs = std::filesystem;
+  if (path.empty() || path.front() == '~') return path;
+  return ((folder.empty() ? fs::current_path() : fs::path(folder)) / path).string();
+}
+
 }  // namespace
 
 Experiment Experiment::load(const std::string& path, const std::vector<std::string>& overrides) {
@@ -106,19 +114,20 @@ Experiment Experiment::resume(const std::string& run_dir, const std::vector<std:
 }
 
 void Experiment::anchorPaths(const std::string& folder) {
-  namespace fs = std::filesystem;
-  std::vector<std::string*> paths = {&settings_.results_dir, &settings_.key_file};
+  std::vector<std::string*> paths = {&settings_.results_dir, &settings_.key_file,
+                                     &settings_.library};
   if (ModelChoice* model = family_->model()) paths.push_back(&model->file);
-  for (std::string* path : paths) {
-    if (path->empty() || path->front() == '~') continue;
-    *path = ((folder.empty() ? fs::current_path() : fs::path(folder)) / *path).string();
-  }
+  for (std::string* path : paths) *path = anchored(*path, folder);
 }
 
 Experiment Experiment::build(const YAML::Node& root, const std::string& source,
                              const std::vector<std::string>& overrides, const std::string& folder) {
   const std::vector<YAML::Node> files = choosePreset(root, source, overrides);
   Experiment experiment;
+  // it may bring what the settings name
+  const std::string library = peek(
+      {}, overrides, "", "library", anchored(peek(files, {}, "", "library", ""), folder));
+  if (!library.empty()) loadLibrary(absolutePath("library", library));
   const std::string learner = peek(files, overrides, "", "learner", experiment.settings_.learner);
   experiment.family_ = envFamilies().at(
       peek(files, overrides, "environment", "name", experiment.settings_.environment))();
@@ -154,6 +163,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   experiment.checkSampling();
   e.results_dir = expandResultsDir(e.results_dir);
   if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
+  if (!e.library.empty()) e.library = absolutePath("library", e.library);
   if (e.run_id.empty()) {
     e.run_id = utcStamp() + "_" + e.algorithm + "_seed" + std::to_string(e.seed);
   }

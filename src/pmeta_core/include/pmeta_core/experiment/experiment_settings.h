@@ -33,6 +33,7 @@ struct EvaluationSchedule {
 struct ExperimentSettings {
   std::string experiment = "experiment";
   std::string preset;                  ///< which of the file's presets; "" for none
+  std::string library;                 ///< shared library with rows of the user's own; "" for none
   std::string algorithm = "pmeta";     ///< a name of algorithms()
   std::string learner = "q_learning";  ///< q_learning (tables), dqn or sac (networks)
   std::string arithmetic = "native";   ///< of networks: native or portable
