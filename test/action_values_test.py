@@ -10,7 +10,7 @@ from run_folders import Kept, edit, fails, plot, write_run
 from value_maps_test import write_policy
 import pmeta_action_values as pa
 import pmeta_drawing as pd
-import pmeta_runs as pr
+import pmeta_groups as pg
 
 
 def point_policy(towards, inputs=1):
@@ -41,7 +41,7 @@ def folder(tmp_path):
 
 
 def load(folder):
-    return pr.load([folder])[0]["grid"][0].runs[0]
+    return pg.load([folder])[0]["grid"][0].runs[0]
 
 
 def test_values_are_the_smaller_critics_with_what_the_policy_knows(folder):

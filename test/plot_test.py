@@ -16,6 +16,7 @@ from run_folders import (HEADER, SCRIPTS, Kept, curve, edit, fails, fresh_mean, 
 import pmeta_convergence as pc
 import pmeta_drawing as pd
 import pmeta_figures as pf
+import pmeta_groups as pg
 import pmeta_runs as pr
 import pmeta_tables as pt
 import pmeta_unseen as pu
@@ -141,13 +142,13 @@ def test_sweep_points_show_mean_and_interval(tmp_path, sweep):
 
 
 def test_the_colours_of_the_policies_are_those_of_rviz():
-    with open(os.path.join(SCRIPTS, "..", "src", "scene_parts.h"), encoding="utf-8") as file:
+    with open(os.path.join(SCRIPTS, "..", "src", "draw", "scene_parts.h"), encoding="utf-8") as file:
         text = file.read()
     for name, color in (("kPersonal", pd.PP_COLOR), ("kMeta", pd.MP_COLOR)):
         assert "%s = rgb(0x%s)" % (name, color[1:].lower()) in text
     assert pf.PP["color"] == pf.TASK_STYLES["personal"][1] == pd.PP_COLOR
     assert pf.MP["color"] == pf.TASK_STYLES["meta"][1] == pd.MP_COLOR
-    others = [style["color"] for _, _, style in pf.BASELINES.values()]
+    others = [style["color"] for style in pf.BASELINE_STYLES]
     assert len(set(others + [pd.PP_COLOR, pd.MP_COLOR])) == 5
 
 
@@ -188,9 +189,9 @@ def test_numbers_in_exponent_form_are_numbers(tmp_path):
 
 
 def test_curves_show_the_default_strength(tmp_path, sweep):
-    pmeta = pr.pmeta_only(groups_of(tmp_path)["grid"])
-    assert pr.reference(pmeta).settings["personal.lambda"] == 10
-    assert pr.reference([g for g in pmeta if g.settings["personal.lambda"] != 10]).label in (
+    ours = pg.without_baselines(groups_of(tmp_path)["grid"])
+    assert pg.reference(ours).settings["personal.lambda"] == 10
+    assert pg.reference([g for g in ours if g.settings["personal.lambda"] != 10]).label in (
         "pMeta-RL λ=1", "pMeta-RL λ=50")
 
 

@@ -125,7 +125,8 @@ def test_packed_runs_are_those_that_were_packed(tmp_path):
         for run, original in zip(found, pr.load_runs(runs)):
             assert list(run.curves["meta"]) == list(original.curves["meta"])
             assert run.fresh.keys() == original.fresh.keys()
-            assert run.settings["results_dir"] == "results"
+            with open(os.path.join(run.folder, "config.yaml")) as file:
+                assert "results_dir: results\n" in file.read()
     assert not os.path.exists(top)
 
 

@@ -14,7 +14,10 @@ SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)),
 sys.path.insert(0, SCRIPTS)
 import plot as program
 import pmeta_drawing as pd
+import pmeta_groups as pg
+import pmeta_manifest as pm
 import pmeta_runs as pr
+from pmeta_files import read_yaml
 
 HEADER = ("round,task,split,policy,context_episodes,return_mean,return_std,episodes,env_steps,"
           "updates,wall_s")
@@ -121,6 +124,23 @@ def make_older(folder):
                 for line in text.splitlines(True)))
 
 
+def make_newer(folder):
+    """The manifest as runs write it that say there what defines them and how they are drawn."""
+    settings = pm.flatten(read_yaml(os.path.join(folder, "config.yaml")))
+    older = pm.older_runs()
+
+    def change(text):
+        manifest = json.loads(text)
+        manifest["defining_settings"] = {
+            key: json.dumps(value) for key, value in settings.items()
+            if key not in older["not_defining"]}
+        manifest["figures"] = dict(older["algorithms"][manifest["algorithm"]], curves=[],
+                                   policies=older["policies"][settings["learner"]])
+        return json.dumps(manifest)
+
+    edit(folder, "manifest.json", change)
+
+
 class Kept(pd.Figures):
     """Keeps [(figure, name)] as they are."""
 
@@ -203,4 +223,4 @@ def edit(folder, name, change):
 
 def groups_of(top):
     folders, _ = pr.find_folders([str(top)])
-    return pr.group_runs(pr.load_runs(folders))
+    return pg.group_runs(pr.load_runs(folders))

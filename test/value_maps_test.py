@@ -12,6 +12,7 @@ import pytest
 
 from run_folders import edit, fails, plot, write_run
 import pmeta_drawing as pd
+import pmeta_groups as pg
 import pmeta_mountain_car as mc
 import pmeta_policies as pp
 import pmeta_value_maps as pv
@@ -131,7 +132,7 @@ def test_a_network_is_computed_as_its_layers_say(tmp_path):
 
 
 def test_maps_show_values_and_where_a_policy_drives(folder):
-    run = pv.pr.load([folder])[0]["grid"][0].runs[0]
+    run = pg.load([folder])[0]["grid"][0].runs[0]
     cars, views = pv.cars_of(run), pv.views_of(run)
     assert [car.zeta for car in cars] == [5, 3] and set(views) == {"personal", "meta"}
 

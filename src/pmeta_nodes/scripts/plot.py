@@ -6,7 +6,7 @@ import sys
 
 # catkin's relay runs this file from another folder
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import pmeta_runs as pr
+import pmeta_groups as pg
 import pmeta_tables as pt
 from pmeta_files import PlotError
 from pmeta_program import Parser, run_program
@@ -64,7 +64,7 @@ def _choices(name, text, known):
 
 
 def plot_folders(options):
-    experiments, convergence = pr.load(options.dirs)
+    experiments, convergence = pg.load(options.dirs)
     import pmeta_drawing as pd
     import pmeta_kinds as pk
     os.makedirs(options.out, exist_ok=True)

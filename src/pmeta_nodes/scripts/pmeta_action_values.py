@@ -7,6 +7,7 @@ from pmeta_drawing import folder_for, headline, panels, wrapped_name
 from pmeta_files import PlotError
 from pmeta_policies import policies_of
 
+NAME = "sparse_point_robot"
 ROWS = {"personal": "PP", "meta": "MP"}
 AXIS = np.linspace(-1, 1, 41)  # actions along x and y
 START = (0.0, 0.0)
@@ -36,8 +37,7 @@ class CriticView:
 
 def views_of(run):
     """{"personal", "meta": [view for each task]} of the policies that the run has kept."""
-    if (run.settings.get("environment.name"), run.settings.get("learner")) != (
-            "sparse_point_robot", "sac"):
+    if (run.settings.get("environment.name"), run.figures.policies) != (NAME, "actor_critic"):
         return {}
     return {name: [CriticView(policy, task_input(run, policy, name, task))
                    for task, policy in enumerate(policies)]

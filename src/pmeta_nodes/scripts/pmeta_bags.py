@@ -6,6 +6,7 @@ The bag holds the definitions of its messages, so it reads anywhere that python3
 import math
 import os
 import re
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -20,7 +21,9 @@ KNOWN = (("personal", "train"), ("meta", "train"), ("meta", "test"))
 class BagRun:
     """The returns of one run, with what a Group asks of a run's curves."""
 
-    seed = None  # the messages do not say it
+    # the messages do not say these
+    seed = None
+    figures = SimpleNamespace(label="")
 
     def __init__(self, path, run_id, returns):
         self.path = path

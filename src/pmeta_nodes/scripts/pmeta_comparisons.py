@@ -1,6 +1,6 @@
 """Tables of what few seeds allow to say: interquartile means, and who is better, with intervals."""
 
-import pmeta_runs as pr
+import pmeta_groups as pg
 import pmeta_statistics as ps
 
 POLICIES = {"pp": "personal", "mp": "meta", "mp_test": "meta_test", "all": "all"}
@@ -9,7 +9,6 @@ MEASURES = {"best": "best", "last": "last", "auc": "AUC", "fresh_best": "fresh (
             "fresh_own_best": "fresh (own best)", "fresh_last": "fresh (last)"}
 # the first that both sides have, of episodes that had no part in a choice before others
 JUDGED_BY = ("fresh_best", "last")
-RIVALS = (("model_averaging", "mp"), ("independent", "pp"), ("pooled", "pp"))
 IQM_COLUMNS = tuple("%s_%s_iqm%s" % (name, measure, what) for name in ("pp", "mp", "mp_test", "all")
                     for measure in MEASURES for what in ("", "_low", "_high")
                     if measure.startswith("fresh") or name != "all")
@@ -71,11 +70,12 @@ def compare(ours, theirs, our_name, their_name, measures=JUDGED_BY):
 
 
 def comparison_cells(groups):
-    """(heads, lines): pMeta-RL against each baseline with the same settings."""
+    """(heads, lines): each group against each baseline with the same settings."""
     lines = []
-    for group in pr.pmeta_only(groups):
-        for algorithm, name in RIVALS:
-            rival = pr.baseline_of(group, groups, algorithm)
+    for group in pg.without_baselines(groups):
+        for algorithm in pg.baselines(groups):
+            rival = pg.baseline_of(group, groups, algorithm)
+            name = "mp" if rival and rival.figures.compared_by == "meta" else "pp"
             found = compare(group, rival, name, name) if rival else None
             if found:
                 measure, value, limits = found

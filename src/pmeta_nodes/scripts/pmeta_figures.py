@@ -5,6 +5,7 @@ import textwrap
 import matplotlib.pyplot as plt
 import numpy as np
 
+import pmeta_groups as pg
 import pmeta_runs as pr
 import pmeta_statistics as ps
 import pmeta_tables as pt
@@ -14,14 +15,10 @@ from pmeta_drawing import (GREEN, GREY, MP_COLOR, ORANGE, PALETTE, PP_COLOR, PUR
                            headline, legend_right, panels, row_height, spread_ticks, wrapped_name)
 from pmeta_files import SNAPSHOTS
 
-BASELINES = {  # algorithm: (the policy it is judged by, label, style)
-    "model_averaging": ("meta", "MP, model averaging",
-                        {"color": GREEN, "linestyle": "--", "marker": "^"}),
-    "independent": ("personal", "PP, independent",
-                    {"color": ORANGE, "linestyle": "-.", "marker": "D"}),
-    "pooled": ("personal", "PP, pooled",
-               {"color": PURPLE, "linestyle": (0, (5, 1)), "marker": "v"}),
-}
+BASELINE_STYLES = ({"color": GREEN, "linestyle": "--", "marker": "^"},
+                   {"color": ORANGE, "linestyle": "-.", "marker": "D"},
+                   {"color": PURPLE, "linestyle": (0, (5, 1)), "marker": "v"})
+SHORT = {"personal": "PP", "meta": "MP"}
 MAX_PANELS = 3
 MAX_SLICES = 4
 MAX_TASK_GROUPS = 6
@@ -33,25 +30,25 @@ TASK_STYLES = {  # label, colour, marker
 
 
 def learning_curves(experiment, groups, figures, prefix):
-    """pMeta-RL against its baselines, a panel for every setting that they share."""
-    pmeta = pr.pmeta_only(groups)
+    """An algorithm against its baselines, a panel for every setting that they share."""
+    ours = pg.without_baselines(groups)
     contexts = {}
-    for group in pmeta:
+    for group in ours:
         contexts.setdefault(group.context(), []).append(group)
-    shown = [pr.reference(members) for members in contexts.values()]
+    shown = [pg.reference(members) for members in contexts.values()]
     if len(shown) > MAX_PANELS:
-        shown = [pr.reference(pmeta)]
+        shown = [pg.reference(ours)]
     # training tasks that differ between panels have scales of their own
     sharey = not any(key.startswith("environment.") and not key.startswith("environment.test_")
-                     for key in pr.varying(shown))
+                     for key in pg.varying(shown))
 
     baselines = [baseline_curves(group, groups) for group in shown]
     drawn = shown + [baseline for found in baselines for baseline, _, _, _ in found]
     drawn = drawn or groups[:len(PALETTE)]
-    steps = pr.differ_in_length(drawn)
+    steps = pg.differ_in_length(drawn)
     figure, axes = panels(1, max(1, len(shown)), sharey)
     for axis, group, found in zip(axes[0], shown, baselines):
-        name = " ".join([pr.ALGORITHMS["pmeta"]] + pr.setting_texts(group, []))
+        name = " ".join([group.name] + pg.setting_texts(group, []))
         for policy, label, style in (("meta", "MP, ", MP), ("personal", "PP, ", PP)):
             if policy in group.policies:
                 draw_curve(axis, group, policy, label + name, steps=steps, zorder=3, **style)
@@ -59,7 +56,7 @@ def learning_curves(experiment, groups, figures, prefix):
         for baseline, policy, label, style in found:
             draw_curve(axis, baseline, policy, label, steps=steps, **style)
         draw_optimum(axis, [group] + [baseline for baseline, _, _, _ in found])
-        axis.set_title(_wrapped(pr.fixed_texts(group, pmeta, "personal.lambda")), loc="left")
+        axis.set_title(_wrapped(pg.fixed_texts(group, ours, "personal.lambda")), loc="left")
         progress_axis(axis, drawn if steps else [group], steps)
     if not shown:
         for group, color in zip(drawn, PALETTE):
@@ -76,14 +73,22 @@ def learning_curves(experiment, groups, figures, prefix):
 def baseline_curves(group, groups):
     """[(baseline, policy, label, style)]; one that goes on for longer is one, too."""
     found = []
-    for algorithm, (policy, label, style) in BASELINES.items():
-        baseline = (pr.baseline_of(group, groups, algorithm)
-                    or pr.baseline_of(group, groups, algorithm, free=pr.LENGTHS))
-        if baseline is not None and policy in baseline.policies:
-            lengths = [pr.setting_text(key, baseline.settings.get(key)) for key in pr.LENGTHS
+    for algorithm in pg.baselines(groups):
+        baseline = (pg.baseline_of(group, groups, algorithm)
+                    or pg.baseline_of(group, groups, algorithm, free=pg.LENGTHS))
+        if baseline is not None and baseline.figures.compared_by in baseline.policies:
+            lengths = [pg.setting_text(key, baseline.settings.get(key)) for key in pg.LENGTHS
                        if baseline.settings.get(key) != group.settings.get(key)]
+            policy, label, style = baseline_look(baseline)
             found.append((baseline, policy, " ".join([label] + lengths), style))
     return found
+
+
+def baseline_look(baseline):
+    """(the policy it is judged by, label, style)"""
+    policy, order = baseline.figures.compared_by, baseline.figures.order
+    return (policy, "%s, %s" % (SHORT[policy], baseline.name),
+            BASELINE_STYLES[(order - 1) % len(BASELINE_STYLES)])
 
 
 def draw_adaptation(axis, group, steps=False):
@@ -94,7 +99,7 @@ def draw_adaptation(axis, group, steps=False):
 
 def bag_curves(run, name, figures):
     """PP and MP of a run from its bag; which algorithm it was the returns do not say."""
-    group = pr.Group("bag", {}, [run])
+    group = pg.Group("", {}, [run])
     figure, axes = panels(1, 1)
     for policy, label, style in (("meta", "MP", MP), ("personal", "PP", PP)):
         if policy in group.policies:
@@ -111,10 +116,10 @@ def setting_curves(experiment, key, members, groups, figures, name):
     """Curves of PP and MP for every value of one setting."""
     figure, axes = panels(1, 2)
     numeric = all(pr.is_number(group.settings.get(key)) for group in members)
-    baseline = averaging_of(members[0], groups)
-    if any(averaging_of(group, groups) is not baseline for group in members):
+    baseline = pg.reference_line(members[0], groups)
+    if any(pg.reference_line(group, groups) is not baseline for group in members):
         baseline = None
-    steps = pr.differ_in_length(members)
+    steps = pg.differ_in_length(members)
     for axis, policy, title in zip(axes[0], ("personal", "meta"),
                                    ("PP, personal policies", "MP, meta-policy")):
         for i, group in enumerate(members):
@@ -123,26 +128,20 @@ def setting_curves(experiment, key, members, groups, figures, name):
             # ordered values get an ordered colour map that keeps its order in grey, too
             color = (plt.get_cmap("viridis")(0.87 * i / (len(members) - 1)) if numeric
                      else PALETTE[i % len(PALETTE)])
-            draw_curve(axis, group, policy, pr.setting_text(key, group.settings.get(key)),
+            draw_curve(axis, group, policy, pg.setting_text(key, group.settings.get(key)),
                        steps=steps, color=color, marker="osD^vP*X"[i % 8])
         if baseline is not None:
-            draw_curve(axis, baseline, "meta", "MP, model averaging", band=False, steps=steps,
+            draw_curve(axis, baseline, "meta", "MP, " + baseline.name, band=False, steps=steps,
                        color=GREY, linestyle="--", linewidth=1.4)
         draw_optimum(axis, members)
         axis.set_title(title, loc="left")
         progress_axis(axis, members, steps)
     axes[0][0].set_ylabel(RETURN)
     legend_right(axes[0])
-    fixed = pr.fixed_texts(members[0], pr.pmeta_only(groups), key)
-    headline(figure, "%s: %s, %s" % (experiment, " ".join(["pMeta-RL"] + fixed),
+    fixed = pg.fixed_texts(members[0], pg.without_baselines(groups), key)
+    headline(figure, "%s: %s, %s" % (experiment, " ".join([members[0].name] + fixed),
                                      over_seeds(SPREAD, members)))
     figures.save(figure, name)
-
-
-def averaging_of(group, groups):
-    """Model averaging with the settings of `group`, if it has a meta-policy to draw."""
-    baseline = pr.baseline_of(group, groups)
-    return baseline if baseline is not None and "meta" in baseline.policies else None
 
 
 def _wrapped(texts):
@@ -163,9 +162,9 @@ def sweep_figure(experiment, key, found, groups, figures, name):
         for axis, measure, title in zip(row, ("last", "auc"),
                                         ("at the last round", "mean over all rounds")):
             draw_sweep(axis, key, members, measure, groups)
-            fixed = pr.fixed_texts(members[0], pr.pmeta_only(groups), key)
+            fixed = pg.fixed_texts(members[0], pg.without_baselines(groups), key)
             axis.set_title("\n".join([title] + ([_wrapped(fixed)] if fixed else [])), loc="left")
-            axis.set_xlabel("%s (%s)" % (pr.symbol(key), key) if pr.symbol(key) != key else key)
+            axis.set_xlabel("%s (%s)" % (pg.symbol(key), key) if pg.symbol(key) != key else key)
         row[0].set_ylabel(RETURN)
     legend_right(axes[0])
     drawn = [group for members in found for group in members]
@@ -178,18 +177,18 @@ def draw_sweep(axis, key, members, measure, groups):
     for policy, label, style in (("meta", "MP", MP), ("personal", "PP", PP)):
         if all(policy in group.policies for group in members):
             draw_points(axis, values, members, measure, policy,
-                        label + ", " + pr.ALGORITHMS.get(members[0].algorithm,
-                                                         members[0].algorithm), style)
-    baselines = [averaging_of(group, groups) for group in members]
+                        "%s, %s" % (label, members[0].name), style)
+    baselines = [pg.reference_line(group, groups) for group in members]
     known = [b for b in baselines if b is not None]
     if known and all(b is known[0] for b in baselines):
+        _, label, style = baseline_look(known[0])
         mean, low, high = mean_and_limits(getattr(known[0], measure)("meta"))
-        axis.axhline(mean, color=GREEN, linestyle="--", linewidth=1.4,
-                     label="MP, model averaging")
-        axis.axhspan(low, high, color=GREEN, alpha=0.16, linewidth=0)
+        axis.axhline(mean, color=style["color"], linestyle=style["linestyle"], linewidth=1.4,
+                     label=label)
+        axis.axhspan(low, high, color=style["color"], alpha=0.16, linewidth=0)
     elif known:
         draw_points(axis, [v for v, b in zip(values, baselines) if b is not None], known, measure,
-                    *BASELINES["model_averaging"])
+                    *baseline_look(known[0]))
     if values.min() > 0 and values.max() / values.min() >= 30:
         axis.set_xscale("log")
         axis.minorticks_off()
@@ -210,7 +209,7 @@ def task_figure(experiment, groups, figures, prefix):
     """PP and MP of each task, every seed a dot: a task that is stuck shows, which a mean hides."""
     figures.write(pt.csv_text(pt.TASK_COLUMNS, pt.task_rows(experiment, groups)),
                   prefix + "tasks_last.csv")
-    shown = pr.chief(groups, MAX_TASK_GROUPS)
+    shown = pg.chief(groups, MAX_TASK_GROUPS)
     if len(shown) < len(groups):
         pr.warn("tasks_last shows %d of the %d groups of %s; tasks_last.csv has all of them."
                 % (len(shown), len(groups), experiment))
@@ -267,19 +266,19 @@ def draw_runs(experiments, kinds, figures):
         prefix = folder_for(experiment, experiments)
         if "curves" in kinds:
             learning_curves(experiment, groups, curves, prefix)
-        if "tasks" in kinds and any(g.deep or any(r.fresh for r in g.runs) for g in groups):
+        if "tasks" in kinds and any(g.figures.policies != "table" or any(r.fresh for r in g.runs) for g in groups):
             task_figure(experiment, groups, figures["tasks"], prefix)
-        pmeta = pr.pmeta_only(groups)
-        keys = pr.varying(pmeta)
-        names = [pr.short_name(key) for key in keys]
+        ours = pg.without_baselines(groups)
+        keys = pg.varying(ours)
+        names = [pg.short_name(key) for key in keys]
         for key in keys:
-            found = pr.slices(pmeta, key)
+            found = pg.slices(ours, key)
             numeric = [m for m in found if all(pr.is_number(g.settings.get(key)) for g in m)]
             # two settings may share the last part of their name
-            name = pr.short_name(key) if names.count(pr.short_name(key)) == 1 else key
+            name = pg.short_name(key) if names.count(pg.short_name(key)) == 1 else key
             # curves of unlike tasks in one panel would compare nothing
             if "curves" in kinds and found and (numeric or not key.startswith("environment.")):
-                members = max(found, key=lambda m: (len(m), pr.reference(pmeta) in m))
+                members = max(found, key=lambda m: (len(m), pg.reference(ours) in m))
                 setting_curves(experiment, key, members, groups, curves, prefix + name + "_curves")
             if "sweep" in kinds and numeric:
                 numeric.sort(key=len, reverse=True)

@@ -232,16 +232,21 @@ class _Loader(yaml.SafeLoader):
 
 
 def read_yaml(path):
+    data = parse_yaml(read_text(path), path)
+    if not isinstance(data, dict):
+        raise PlotError("%s must hold settings as 'key: value' lines." % path)
+    return data
+
+
+def parse_yaml(text, where):
+    """The value of a YAML text; `where` names it in errors."""
     try:
-        data = yaml.load(read_text(path), Loader=_Loader)
+        return yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = " line %d" % (mark.line + 1) if mark else ""
         problem = getattr(error, "problem", None)
         raise PlotError("%s%s is not valid YAML%s."
-                        % (path, line, ": " + problem if problem else ""))
+                        % (where, line, ": " + problem if problem else ""))
     except RecursionError:
-        raise PlotError("%s is nested too deeply to be read." % path)
-    if not isinstance(data, dict):
-        raise PlotError("%s must hold settings as 'key: value' lines." % path)
-    return data
+        raise PlotError("%s is nested too deeply to be read." % where)

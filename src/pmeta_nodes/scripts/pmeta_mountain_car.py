@@ -2,6 +2,7 @@
 
 import numpy as np
 
+NAME = "mountain_car"  # of the environment
 LOWEST, HIGHEST = -1.2, 0.6
 FASTEST = 0.07
 GOAL = 0.5

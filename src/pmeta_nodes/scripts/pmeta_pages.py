@@ -10,6 +10,7 @@ import re
 
 import pmeta_archives as pa
 import pmeta_comparisons as pc
+import pmeta_groups as pg
 import pmeta_runs as pr
 import pmeta_statistics as ps
 import pmeta_tables as pt
@@ -51,7 +52,7 @@ class Data:
 
     def experiments(self, names):
         """Groups of all runs of the sweeps that there are, in one."""
-        return pr.group_runs([run for name in names if self.has(name) for run in self.runs(name)])
+        return pg.group_runs([run for name in names if self.has(name) for run in self.runs(name)])
 
     def group(self, side):
         """The one group of an aim or of a side of a claim; None if it has not been run."""
@@ -70,7 +71,7 @@ def _has_setting(group, name, value):
     if name == "algorithm":
         return group.algorithm == value
     return any(setting == value for key, setting in group.settings.items()
-               if name in (key, pr.short_name(key)))
+               if name in (key, pg.short_name(key)))
 
 
 def pages_of(folder):

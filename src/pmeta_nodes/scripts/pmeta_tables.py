@@ -7,12 +7,14 @@ import os
 import numpy as np
 
 import pmeta_comparisons as pc
-import pmeta_runs as pr
+import pmeta_groups as pg
 from pmeta_files import OWN_BEST, SNAPSHOTS
+from pmeta_manifest import data_file, plain
 
 WIDTH = 120
 BEST_HEADS = {"best": "best", "last": "last", "fresh_best": "fresh (best)",
               "fresh_own_best": "fresh (own best)", "fresh_last": "fresh (last)"}
+ALL_LEGEND = ("all: every personal policy on every task, mean over all pairs.",)
 TEX_HEADS = {"best": "best", "fresh_best": "fresh", "fresh_own_best": "fresh, own best"}
 LEARNING = {  # head: columns of the mean and of its spread
     "PP last": ("pp_last_mean", "pp_last_std"), "MP last": ("mp_last_mean", "mp_last_std"),
@@ -33,30 +35,7 @@ COLUMNS = ("experiment", "group", "algorithm", "lambda", "seeds", "pp_last_mean"
 TASK_COLUMNS = ("experiment", "group", "snapshot", "policies", "episodes", "task", "name", "seeds",
                 "mean", "std", "min", "max")
 
-# "On the Convergence Theory of Meta Reinforcement Learning with Personalized Policies":
-# by_lambda is its table "Effect of regularization lambda" (which calls MountainCar's rows GM, PM),
-# best its table "Best average return comparison results for each algorithm on the Gym suites".
-PAPER = {
-    "cart_pole": {
-        "by_lambda": {
-            "mp": {5: (185.11, 2.52), 20: (192.54, 1.56), 30: (191.51, 1.23), 50: (190.86, 2.09)},
-            "pp": {5: (196.47, 0.89), 20: (197.13, 0.45), 30: (196.53, 1.03), 50: (196.72, 0.68)}},
-        "best": {("independent", "pp"): (198.05, 1.03), ("independent", "all"): (169.20, 2.89),
-                 ("model_averaging", "mp"): (191.92, 1.36),
-                 ("pmeta", "mp"): (192.54, 2.54), ("pmeta", "pp"): (197.13, 0.45)}},
-    "mountain_car": {
-        "by_lambda": {
-            "mp": {5: (-111.15, 4.31), 20: (-107.08, 3.21), 30: (-110.49, 3.89),
-                   50: (-108.41, 2.78)},
-            "pp": {5: (-93.05, 1.07), 20: (-92.13, 0.95), 30: (-92.41, 1.25), 50: (-98.16, 2.13)}},
-        "best": {("independent", "pp"): (-92.96, 2.08), ("independent", "all"): (-133.96, 3.25),
-                 ("model_averaging", "mp"): (-111.34, 5.95),
-                 ("pmeta", "mp"): (-107.15, 4.10), ("pmeta", "pp"): (-93.05, 0.95)}},
-}
-PAPER_LAMBDA = 20  # of its best table
-# what its numbers presume, besides the tasks: networks, batch, and updates (C times R)
-PAPER_SETTINGS = {"dqn.hidden": (512, 512), "dqn.batch_size": 64}
-PAPER_UPDATES = {"cart_pole": 30 * 200, "mountain_car": 30 * 500}
+PAPER = data_file("paper.yaml")
 LATEX = str.maketrans({
     "\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
     "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", "α": r"$\alpha$",
@@ -72,8 +51,7 @@ def summary_rows(experiments):
             row = dict.fromkeys(COLUMNS)
             row.update(experiment=experiment, group=group.label, algorithm=group.algorithm,
                        seeds=len(group.runs), fresh_seeds=sum(bool(r.fresh) for r in group.runs))
-            if group.algorithm == "pmeta":
-                row["lambda"] = group.settings.get("personal.lambda")
+            row["lambda"] = group.settings.get("personal.lambda")
             # only the summary's text and LaTeX ask for these
             row["as_paper"] = as_in_paper(experiment, group)
             row["learner"] = group.settings.get("learner")
@@ -87,18 +65,18 @@ def summary_rows(experiments):
                 # those of pMeta-RL are not run on each other's tasks, or not in every seed
                 for snapshot in SNAPSHOTS + (OWN_BEST,):
                     _enter(row, "%s_fresh_%s" % (name, snapshot), group.fresh(snapshot, policy))
-            if group.algorithm == "pmeta":
-                row.update(paired_differences(group, pr.baseline_of(group, groups)))
+            if not group.figures.baseline:
+                row.update(paired_differences(group, pg.reference_line(group, groups)))
             rows.append(row)
     return rows
 
 
 def as_in_paper(experiment, group):
     """May the paper's numbers stand beside those of the group?"""
-    return experiment in PAPER and all(
-        group.settings.get(k) == v for k, v in PAPER_SETTINGS.items()) and (
+    return experiment in PAPER["experiments"] and all(
+        group.settings.get(k) == plain(v) for k, v in PAPER["settings"].items()) and (
             int(group.rounds[-1]) * group.settings.get("updates_per_round", 1)
-            == PAPER_UPDATES[experiment])
+            == PAPER["experiments"][experiment]["updates"])
 
 
 def _enter(row, name, values):
@@ -109,8 +87,8 @@ def _enter(row, name, values):
 
 
 def paired_differences(group, baseline):
-    """AUC of pMeta-RL less that of model averaging's meta-policy, seed by seed."""
-    if baseline is None or "meta" not in baseline.policies:
+    """AUC less that of the baseline's meta-policy, seed by seed."""
+    if baseline is None:
         return {}
     seeds = [seed for seed in group.seeds if seed in baseline.seeds]
     found = {"pairs": len(seeds)}
@@ -176,14 +154,9 @@ def legend_lines(rows):
     if any(row["pp_fresh_own_best_mean"] is not None for row in rows):
         lines += ["fresh (own best): the same where each robot keeps its personal policy of the",
                   "round in which it did best on its own task."]
-    if any(row["all_fresh_best_mean"] is not None and row["algorithm"] == "pooled"
-           for row in rows):
-        lines += ["pooled DQN on all tasks: every pooled policy, which trained in environments of",
-                  "all tasks, on every task, mean over all pairs."]
-    if any(row["all_fresh_best_mean"] is not None and row["algorithm"] != "pooled"
-           for row in rows):
-        lines += ["all: every personal policy on every task, mean over all pairs (the paper's DQN;",
-                  "its DQN* is the PP of independent)."]
+    legends = [tuple(paper_names(row).get("legend", ALL_LEGEND)) for row in rows
+               if row["all_fresh_best_mean"] is not None]
+    lines += [line for legend in sorted(set(legends), reverse=True) for line in legend]
     if any(row["as_paper"] for row in rows):
         lines += ["paper, λ and paper, best: its table by λ and its table of best returns, beside runs",
                   "with its networks, batch and number of updates, whatever their other settings."]
@@ -228,11 +201,9 @@ def known_measures(rows, measures):
 
 def best_policies(row, measures):
     """[(pp, mp, mp_test or all, its name)] of which the group has a return."""
-    deep = row["algorithm"] == "independent" and row["learner"] == "dqn"
-    names = {"pp": "PP (DQN*)" if deep else "PP", "mp": "MP", "mp_test": "MP on test tasks",
-             "all": "all (DQN)" if deep else "all"}
-    if row["algorithm"] == "pooled":
-        names["all"] = "pooled DQN on all tasks"
+    names = dict({"pp": "PP", "mp": "MP", "mp_test": "MP on test tasks", "all": "all"},
+                 **paper_names(row))
+    names.pop("legend", None)
     return [(name, text) for name, text in names.items()
             if any(row.get("%s_%s_mean" % (name, m)) is not None for m in measures)]
 
@@ -247,12 +218,16 @@ def paper_values(row, name):
     unknown = (None, None)
     if not row["as_paper"]:
         return unknown, unknown
-    known = PAPER[row["experiment"]]
-    strength = row["lambda"]
+    known, strength = PAPER["experiments"][row["experiment"]], row["lambda"]
     by_lambda = known["by_lambda"].get(name, {}).get(strength, unknown)
-    if row["algorithm"] == "pmeta" and strength != PAPER_LAMBDA:
+    if strength not in (None, PAPER["lambda"]):
         return by_lambda, unknown
-    return by_lambda, known["best"].get((row["algorithm"], name), unknown)
+    return by_lambda, known["best"].get(row["algorithm"], {}).get(name, unknown)
+
+
+def paper_names(row):
+    """What its policies are called there: {pp, all or legend: words}."""
+    return PAPER["names"].get(row["algorithm"], {}).get(row["learner"], {})
 
 
 def aligned(heads, lines, left=1):
@@ -320,9 +295,9 @@ def lambda_table_tex(experiments, rows):
     by_label = {(row["experiment"], row["group"]): row for row in rows}
     blocks = []
     for experiment, groups in experiments.items():
-        pmeta = [group for group in groups if group.algorithm == "pmeta"]
-        for members in pr.slices(pmeta, "personal.lambda"):
-            fixed = pr.fixed_texts(members[0], pmeta, "personal.lambda")
+        ours = pg.without_baselines(groups)
+        for members in pg.slices(ours, "personal.lambda"):
+            fixed = pg.fixed_texts(members[0], ours, "personal.lambda")
             blocks.append((" ".join([experiment] + fixed),
                            [by_label[experiment, group.label] for group in members]))
     if not blocks:
@@ -332,7 +307,7 @@ def lambda_table_tex(experiments, rows):
     for i, (label, members) in enumerate(blocks):
         lines += [r"\midrule"] if i else []
         pad = [""] * (width - len(members))
-        lines.append(" & ".join([latex(label)] + [r"$\lambda=%s$" % pr.value_text(row["lambda"])
+        lines.append(" & ".join([latex(label)] + [r"$\lambda=%s$" % pg.value_text(row["lambda"])
                                                   for row in members] + pad) + r" \\")
         lines.append(r"\cmidrule{2-%d}" % (len(members) + 1))
         for measure, suffix in (("best", ""), ("fresh_best", ", fresh")):

@@ -5,6 +5,7 @@ import textwrap
 import matplotlib.pyplot as plt
 import numpy as np
 
+import pmeta_groups as pg
 import pmeta_runs as pr
 from pmeta_curves import (RETURN, SPREAD, draw_curve, meta_label, meta_style, over_seeds,
                           progress_axis)
@@ -22,7 +23,7 @@ def draw_unseen(experiments, figures):
 
 def unseen_tasks(experiment, groups, figures, prefix):
     """A row for each group: its meta-policy's curves, and its last round task by task."""
-    shown = pr.chief(groups, MAX_GROUPS)
+    shown = pg.chief(groups, MAX_GROUPS)
     if len(shown) < len(groups):
         pr.warn("unseen_tasks shows %d of the %d groups of %s."
                 % (len(shown), len(groups), experiment))
@@ -31,7 +32,7 @@ def unseen_tasks(experiment, groups, figures, prefix):
     figure, axes = plt.subplots(len(shown), 2, squeeze=False, constrained_layout=True,
                                 gridspec_kw={"width_ratios": (1.25, 1)},
                                 figsize=(11.4, 0.4 + len(shown) * max(3.3, 0.7 + tasks_height)))
-    steps = pr.differ_in_length(shown)
+    steps = pg.differ_in_length(shown)
     for (left, right), group in zip(axes, shown):
         for split in ("train", "test"):
             counts = group.adaptations(split)

@@ -51,8 +51,7 @@ def cars_of(run):
 
 def views_of(run):
     """{"personal", "meta": [view for each task]} of the policies that the run has kept."""
-    if (run.settings.get("environment.name"), run.settings.get("learner")) != ("mountain_car",
-                                                                               "dqn"):
+    if (run.settings.get("environment.name"), run.figures.policies) != (mc.NAME, "q_network"):
         return {}
     scale = run.settings.get("environment.velocity_scale", 1)
     return {name: [NetworkView(policy, scale) for policy in policies]

@@ -6,7 +6,7 @@ import sys
 
 # catkin's relay runs this file from another folder
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import pmeta_runs as pr
+import pmeta_groups as pg
 import pmeta_tables as pt
 from pmeta_files import warn, warnings_to
 from pmeta_program import Parser, run_program
@@ -31,7 +31,7 @@ def report(dirs, folder):
     """The page as text; `folder` is where it will lie, which its links start from."""
     notes = []
     with warnings_to(notes.append):
-        experiments, convergence = pr.load(dirs)
+        experiments, convergence = pg.load(dirs)
         # slow to load, and of no use to a wrong argument
         import pmeta_html as ph
         import pmeta_sections as ps

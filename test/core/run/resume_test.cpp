@@ -6,10 +6,10 @@
 #include <stdexcept>
 
 #include "../support.h"
-#include "storage/checkpoint_experiments.h"
-#include "pmeta_core/storage/checkpoint.h"
 #include "pmeta_core/run/local_runner.h"
+#include "pmeta_core/storage/checkpoint.h"
 #include "pmeta_core/storage/policy_file.h"
+#include "storage/checkpoint_experiments.h"
 
 namespace pmeta {
 namespace {
@@ -265,6 +265,33 @@ TEST(Resume, TakesOnlySettingsThatDoNotDefineTheRun) {
   EXPECT_EQ(errorOf([&] { Experiment::resume(dir / "second/table/walk"); }),
             "the run folder " + (dir / "second/table/walk") +
                 " must be <results_dir>/table/run, as its config.yaml names it.");
+}
+
+TEST(Resume, WhatDefinesTheRunStandsInItsManifest) {
+  const TempDir dir;
+  const Experiment experiment = checkpointExperiment("table", dir.path());
+  runUntilStopped(experiment, 2);
+  const std::string run = experiment.runDir();
+  writeFile(run + "/config.yaml",
+            Experiment::parse(experiment.yaml(), "", {"personal.alpha:=0.01"}).yaml());
+  EXPECT_EQ(errorOf([&] { Experiment::resume(run); }),
+            "personal.alpha cannot be changed in a run that goes on: resume " + run +
+                " without it, or begin a new run.");
+  nlohmann::json manifest = manifestOf(experiment);
+  manifest["defining_settings"]["seed"] = 3;
+  writeFile(run + "/manifest.json", manifest.dump());
+  EXPECT_EQ(errorOf([&] { Experiment::resume(run); }),
+            run +
+                "/manifest.json must hold a text for each of its defining_settings: it has been "
+                "altered.");
+
+  // those of older runs do not say it
+  writeFile(run + "/config.yaml", experiment.yaml());
+  manifest.erase("defining_settings");
+  writeFile(run + "/manifest.json", manifest.dump());
+  EXPECT_EQ(Experiment::resume(run).definingSettings(), experiment.definingSettings());
+  EXPECT_NE(errorOf([&] { Experiment::resume(run, {"lambda:=5"}); }).find("lambda cannot be"),
+            std::string::npos);
 }
 
 TEST(Resume, ACheckpointThatCannotBeWrittenStopsTheRunInOneSentence) {

@@ -13,6 +13,7 @@
 
 #include "../support.h"
 #include "pmeta_core/base/version.h"
+#include "pmeta_core/storage/manifest.h"
 
 namespace pmeta {
 namespace {
@@ -418,6 +419,43 @@ TEST(RunLog, ManifestTellsWhatRan) {
   EXPECT_EQ(task.at("description"), "3x3 cells, landmark at row 2, column 2");
 }
 
+nlohmann::json manifestWith(std::vector<std::string> overrides) {
+  const TempDir dir;
+  overrides.push_back("results_dir:=" + dir.path());
+  return nlohmann::json::parse(constantManifest(threeTasks(overrides), "now"));
+}
+
+TEST(Manifest, HoldsWhatDefinesTheRun) {
+  const Experiment experiment = threeTasks({"lambda:=7", "pace:=2", "checkpoint.interval:=3"});
+  const auto manifest = nlohmann::json::parse(constantManifest(experiment, "now"));
+  const auto& settings = manifest.at("defining_settings");
+  EXPECT_EQ(settings, nlohmann::json(experiment.definingSettings()));
+  EXPECT_EQ(settings.at("personal.lambda"), "7");
+  EXPECT_EQ(settings.at("environment.sizes"), "[2, 3, 4]");
+  EXPECT_FALSE(settings.contains("pace"));
+  EXPECT_FALSE(settings.contains("checkpoint.interval"));
+}
+
+TEST(Manifest, SaysWhatFiguresMustKnow) {
+  const auto pmeta = manifestWith({}).at("figures");
+  EXPECT_EQ(pmeta.at("label"), "pMeta-RL");
+  EXPECT_EQ(pmeta.at("baseline"), false);
+  EXPECT_EQ(pmeta.at("policies"), "table");
+  EXPECT_EQ(pmeta.at("fixed_settings"), nlohmann::json::array());
+  EXPECT_EQ(pmeta.at("curves").size(), 2u);
+  EXPECT_EQ(pmeta["curves"][1].dump(), R"({"context_episodes":0,"policy":"meta","split":"train"})");
+
+  const auto alone = manifestWith({"algorithm:=independent"}).at("figures");
+  EXPECT_EQ(alone.at("baseline"), true);
+  EXPECT_EQ(alone.at("compared_by"), "personal");
+  EXPECT_EQ(alone.at("curves").size(), 1u);
+  const std::vector<std::string> fixed = alone.at("fixed_settings");
+  for (const char* key : {"personal.lambda", "personal.eta", "aggregation.rule"}) {
+    EXPECT_EQ(std::count(fixed.begin(), fixed.end(), key), 1) << key;
+  }
+  EXPECT_EQ(std::count(fixed.begin(), fixed.end(), "personal.alpha"), 0);
+}
+
 TEST(RunLog, AFailureStandsInTheManifestWithItsReason) {
   const TempDir dir;
   const Experiment experiment = threeTasks({"results_dir:=" + dir.path()});
@@ -531,7 +569,8 @@ TEST(RoundBook, RefusesWhatIsNoResult) {
         << i;
   }
   EXPECT_TRUE(book.add(makeReturn(2, 1, PolicyKind::kPersonal))) << "its place is still free";
-  EXPECT_FALSE(book.add(makeReturn(2, 1, PolicyKind::kPersonal))) << "a duplicate is none the less one";
+  EXPECT_FALSE(book.add(makeReturn(2, 1, PolicyKind::kPersonal)))
+      << "a duplicate is none the less one";
 }
 
 TEST(RoundBook, CountersThatOverflowOnlyWhenTheyAreSummedAreRefused) {

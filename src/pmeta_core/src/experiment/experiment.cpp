@@ -1,8 +1,12 @@
 #include "pmeta_core/experiment/experiment.h"
 
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 #include <tuple>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/file.h"
 #include "pmeta_core/base/hash.h"
 #include "pmeta_core/env/model_files.h"
 
@@ -23,6 +27,22 @@ std::map<std::string, std::string> Experiment::definingSettings(const std::strin
     settings.erase(key);
   }
   return settings;
+}
+
+std::map<std::string, std::string> Experiment::definingSettingsOf(const std::string& run_dir) {
+  const std::string path = run_dir + "/manifest.json";
+  const auto manifest = std::filesystem::exists(path)
+                            ? nlohmann::json::parse(readFile(path, "the manifest"), nullptr, false)
+                            : nlohmann::json::object();
+  if (!manifest.is_object() || !manifest.contains("defining_settings")) {
+    return definingSettings(readFile(run_dir + "/config.yaml", "the settings file"));
+  }
+  const nlohmann::json& settings = manifest["defining_settings"];
+  const auto is_text = [](const nlohmann::json& value) { return value.is_string(); };
+  if (!settings.is_object() || !std::all_of(settings.begin(), settings.end(), is_text)) {
+    throw Error(path + " must hold a text for each of its defining_settings: it has been altered.");
+  }
+  return settings.get<std::map<std::string, std::string>>();
 }
 
 std::string Experiment::settingsHash() const {

@@ -105,7 +105,8 @@ Experiment Experiment::resume(const std::string& run_dir, const std::vector<std:
   std::vector<std::string> changed = overrides;
   changed.push_back(place);
   Experiment experiment = load(config, changed);
-  const std::string key = firstDifference(saved.definingSettings(), experiment.definingSettings());
+  const std::string key =
+      firstDifference(definingSettingsOf(dir.string()), experiment.definingSettings());
   if (!key.empty()) {
     throw Error(key + " cannot be changed in a run that goes on: resume " + dir.string() +
                 " without it, or begin a new run.");

@@ -24,6 +24,7 @@
 #include "pmeta_core/run/sweep.h"
 #include "pmeta_core/security/authentication.h"
 #include "pmeta_core/security/key_file.h"
+#include "pmeta_core/storage/manifest.h"
 #include "pmeta_core/theory/convergence.h"
 #include "pmeta_core/verify/model_check.h"
 #include "pmeta_core/verify/trajectory_check.h"

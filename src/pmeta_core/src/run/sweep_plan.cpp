@@ -123,10 +123,16 @@ std::string plainName(const Experiment& experiment, const std::vector<Axis>& axe
   return name.empty() ? "run" : name;
 }
 
-// of what decides a run's numbers
+// what decides a run's numbers
+std::map<std::string, std::string> withoutName(std::map<std::string, std::string> settings) {
+  settings.erase("run_id");
+  return settings;
+}
+
 std::string shortHash(const Experiment& run) {
   std::string text;
-  for (const auto& [key, value] : decidingSettings(run.yaml())) text += key + ": " + value + "\n";
+  for (const auto& [key, value] : withoutName(run.definingSettings()))
+    text += key + ": " + value + "\n";
   return hashText(text).substr(0, 16);
 }
 
@@ -148,18 +154,11 @@ std::vector<std::string> nameRuns(const std::vector<Experiment>& runs,
 
 }  // namespace
 
-std::map<std::string, std::string> decidingSettings(const std::string& yaml) {
-  std::map<std::string, std::string> settings = Experiment::definingSettings(yaml);
-  settings.erase("run_id");
-  return settings;
-}
-
 void requireSameSettings(const Experiment& experiment) {
   const std::string dir = experiment.runDir();
-  const std::string config = dir + "/config.yaml";
-  if (!std::filesystem::exists(config)) return;
-  const auto found = decidingSettings(readFile(config, "the settings file"));
-  const auto expected = decidingSettings(experiment.yaml());
+  if (!std::filesystem::exists(dir + "/config.yaml")) return;
+  const auto found = withoutName(Experiment::definingSettingsOf(dir));
+  const auto expected = withoutName(experiment.definingSettings());
   const std::string key = firstDifference(found, expected);
   if (key.empty()) return;
   const auto shown = [&](const std::map<std::string, std::string>& settings) {
@@ -179,7 +178,7 @@ std::vector<Experiment> planSweep(const SweepPlan& plan) {
   std::set<std::map<std::string, std::string>> seen;
   for (const std::vector<std::string>& combination : combinations(axes)) {
     const Experiment run = Experiment::load(plan.config, combination);
-    if (!seen.insert(decidingSettings(run.yaml())).second) continue;
+    if (!seen.insert(withoutName(run.definingSettings())).second) continue;
     assignments.push_back(combination);
     unplaced.push_back(run);
   }

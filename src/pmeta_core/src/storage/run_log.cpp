@@ -16,9 +16,8 @@
 #include "pmeta_core/base/file.h"
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/number.h"
-#include "pmeta_core/base/version.h"
 #include "pmeta_core/experiment/results_dir.h"
-#include "pmeta_core/nn/machine.h"
+#include "pmeta_core/storage/manifest.h"
 
 namespace pmeta {
 namespace {
@@ -26,50 +25,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::seconds kManifestInterval{1};
-
-// what does not change of manifest.json, with a place for what does
-std::string constantManifest(const Experiment& experiment, const std::string& started) {
-  const ExperimentSettings& e = experiment.settings();
-  Json manifest;
-  manifest["experiment"] = e.experiment;
-  manifest["run_id"] = e.run_id;
-  manifest["algorithm"] = e.algorithm;
-  manifest["seed"] = e.seed;
-  manifest["status"] = nullptr;
-  manifest["reason"] = nullptr;
-  manifest["rounds_done"] = nullptr;
-  manifest["rounds"] = e.rounds;
-  manifest["broken_episodes"] = nullptr;
-  manifest["started"] = started;
-  manifest["ended"] = nullptr;
-  manifest["host"] = hostName();
-  manifest["pid"] = ::getpid();
-  manifest["settings_hash"] = experiment.settingsHash();
-  if (experiment.model() != nullptr) manifest["model_hash"] = experiment.model()->hash;
-  manifest["commit"] = commit();
-  manifest["versions"] = versions();
-  manifest["machine"] = machine();
-  manifest["tasks"] = Json::array();
-  for (int task = 0; task < experiment.totalTasks(); ++task) {
-    const Split split = experiment.isTestTask(task) ? Split::kTest : Split::kTrain;
-    Json entry = {{"task", task},
-                  {"split", name(split)},
-                  {"name", experiment.family().taskName(task)},
-                  {"description", experiment.family().taskDescription(task)}};
-    if (const auto optimum = experiment.optimalReturn(task)) entry["optimal_return"] = *optimum;
-    manifest["tasks"].push_back(std::move(entry));
-  }
-  return manifest.dump();
-}
-
-// a text of manifest.json; "" if there is none
-std::string manifestText(const std::string& run_dir, const char* key) {
-  const std::string path = run_dir + "/manifest.json";
-  if (!std::filesystem::exists(path)) return "";
-  const auto manifest = Json::parse(readFile(path, "the manifest"), nullptr, false);
-  const bool given = manifest.is_object() && manifest.contains(key) && manifest[key].is_string();
-  return given ? manifest[key].get<std::string>() : "";
-}
 
 std::string manifestStatus(const std::string& run_dir) { return manifestText(run_dir, "status"); }
 
@@ -278,26 +233,6 @@ void RunLog::writeManifest(const std::string& status, const std::string& reason)
 std::string runStatus(const std::string& run_dir) {
   const std::string status = manifestStatus(run_dir);
   return status == "running" && RunLock::holder(run_dir).empty() ? "interrupted" : status;
-}
-
-std::string otherMachine(const Experiment& experiment) {
-  // tables have no matrix products; portable ones are the same everywhere
-  if (experiment.settings().learner == "q_learning") return "";
-  const bool portable = experiment.settings().arithmetic == "portable";
-  const std::string path = experiment.runDir() + "/manifest.json";
-  if (!std::filesystem::exists(path)) return "";
-  const Json manifest = Json::parse(readFile(path, "the manifest"), nullptr, false);
-  if (!manifest.is_object() || !manifest.contains("machine")) return "";
-  const Json& before = manifest["machine"];
-  const std::map<std::string, std::string> now = machine();
-  for (const char* part : {"products", "processor", "glibc"}) {
-    if (portable && part != std::string("glibc")) continue;
-    if (!before.is_object() || !before.contains(part) || before[part] == now.at(part)) continue;
-    return "the run was begun on another machine (" + std::string(part) + " " +
-           shown(before[part].is_string() ? before[part].get<std::string>() : "") + ", here " +
-           shown(now.at(part)) + "): its numbers may differ from those of a run that stays on one.";
-  }
-  return "";
 }
 
 void requireResumable(const std::string& run_dir) {

@@ -22,6 +22,7 @@
 #include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/experiment/results_dir.h"
 #include "pmeta_core/security/authentication.h"
+#include "pmeta_core/storage/manifest.h"
 #include "pmeta_core/storage/run_log.h"
 
 namespace {

@@ -99,8 +99,9 @@ class Experiment {
   /// results_dir, checkpoint.*, pace, publish_trajectories, aggregation.round_timeout and key_file,
   /// and of a model the hash, not where it is.
   std::map<std::string, std::string> definingSettings() const { return definingSettings(yaml_); }
-  /// The same of effective settings as YAML, e.g. those of a run folder's config.yaml.
-  static std::map<std::string, std::string> definingSettings(const std::string& yaml);
+  /// The same of a run folder, as its manifest.json has them; those of older runs are read from
+  /// config.yaml. Throws Error if neither can be read.
+  static std::map<std::string, std::string> definingSettingsOf(const std::string& run_dir);
   /// A hash of those, as text: parties of one run have the same.
   std::string settingsHash() const;
   /// Every setting for people: its value, the default where that is another, and its meaning.
@@ -118,6 +119,7 @@ class Experiment {
   Experiment();
   static Experiment build(const YAML::Node& root, const std::string& source,
                           const std::vector<std::string>& overrides, const std::string& folder);
+  static std::map<std::string, std::string> definingSettings(const std::string& yaml);
   void anchorPaths(const std::string& folder);
   std::unique_ptr<PersonalLearner> makeLearnerUnguarded(int task) const;
   void checkSampling() const;

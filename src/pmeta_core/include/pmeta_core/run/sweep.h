@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <functional>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -36,11 +35,8 @@ struct SweepProgress {
   double eta_seconds = 0;  ///< for the rest
 };
 
-/// Of effective settings as YAML, those that decide a run's numbers: Experiment::definingSettings()
-/// without the run's name.
-std::map<std::string, std::string> decidingSettings(const std::string& yaml);
-
-/// Throws Error if the run's folder holds a run whose deciding settings are others.
+/// Throws Error if the run's folder holds a run with other defining settings, but for the
+/// run's name.
 void requireSameSettings(const Experiment& experiment);
 
 /// A run of a sweep that ended with an error.

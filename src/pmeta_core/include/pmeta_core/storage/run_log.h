@@ -72,10 +72,6 @@ class RunLog {
 /// manifest says that it runs but nobody writes it, or "" if it holds no run.
 std::string runStatus(const std::string& run_dir);
 
-/// What differs between the machine that the run folder's manifest names and this one, as one
-/// sentence, where it changes the numbers of this experiment; "" if nothing does.
-std::string otherMachine(const Experiment& experiment);
-
 /// Throws Error unless the folder holds a run that is not finished.
 void requireUnfinished(const std::string& run_dir);
 

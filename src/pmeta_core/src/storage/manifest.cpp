@@ -1,0 +1,143 @@
+#include "pmeta_core/storage/manifest.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/file.h"
+#include "pmeta_core/base/format.h"
+#include "pmeta_core/base/version.h"
+#include "pmeta_core/experiment/algorithm.h"
+#include "pmeta_core/messages/protocol.h"
+#include "pmeta_core/nn/machine.h"
+#include "pmeta_core/storage/run_lock.h"
+
+namespace pmeta {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// by learner
+const std::map<std::string, const char*> kPolicies = {
+    {"q_learning", "table"}, {"dqn", "q_network"}, {"sac", "actor_critic"}};
+
+const std::vector<std::string> kPull = {"personal.lambda",        "personal.lambda_actor",
+                                        "personal.lambda_critic", "personal.lambda_encoder",
+                                        "personal.eta",           "personal.personal_init",
+                                        "personal.proximal"};
+
+std::vector<std::string> fixedSettings(const Experiment& experiment, const Algorithm& algorithm) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : experiment.definingSettings()) {
+    const bool pull = std::find(kPull.begin(), kPull.end(), key) != kPull.end();
+    if (pull ? !algorithm.pulls : !algorithm.shares && key.rfind("aggregation.", 0) == 0) {
+      keys.push_back(key);
+    }
+  }
+  return keys;
+}
+
+Json curves(const Experiment& experiment) {
+  Json found = Json::array();
+  const auto add = [&](PolicyKind policy, Split split, int context_episodes) {
+    found.push_back(
+        {{"policy", name(policy)}, {"split", name(split)}, {"context_episodes", context_episodes}});
+  };
+  add(PolicyKind::kPersonal, Split::kTrain, 0);
+  if (!experiment.evaluatesMeta()) return found;
+  for (const Split split : {Split::kTrain, Split::kTest}) {
+    if (split == Split::kTest && experiment.numTestTasks() == 0) continue;
+    for (const int count : experiment.contextEpisodes()) add(PolicyKind::kMeta, split, count);
+  }
+  return found;
+}
+
+Json figures(const Experiment& experiment) {
+  const Algorithm& algorithm = experiment.algorithm();
+  const bool averages = algorithm.shares && !algorithm.pulls;
+  Json found;
+  found["label"] = algorithm.label;
+  found["order"] = !algorithm.pulls + !algorithm.shares + algorithm.pools_environments;
+  found["baseline"] = !algorithm.pulls;
+  found["reference_line"] = averages;
+  found["compared_by"] = name(averages ? PolicyKind::kMeta : PolicyKind::kPersonal);
+  found["own_settings"] = algorithm.pulls ? kPull : std::vector<std::string>();
+  found["fixed_settings"] = fixedSettings(experiment, algorithm);
+  const auto policies = kPolicies.find(experiment.settings().learner);
+  found["policies"] = policies == kPolicies.end() ? "other" : policies->second;
+  found["curves"] = curves(experiment);
+  return found;
+}
+
+}  // namespace
+
+std::string constantManifest(const Experiment& experiment, const std::string& started) {
+  const ExperimentSettings& e = experiment.settings();
+  Json manifest;
+  manifest["experiment"] = e.experiment;
+  manifest["run_id"] = e.run_id;
+  manifest["algorithm"] = e.algorithm;
+  manifest["seed"] = e.seed;
+  manifest["status"] = nullptr;
+  manifest["reason"] = nullptr;
+  manifest["rounds_done"] = nullptr;
+  manifest["rounds"] = e.rounds;
+  manifest["broken_episodes"] = nullptr;
+  manifest["started"] = started;
+  manifest["ended"] = nullptr;
+  manifest["host"] = hostName();
+  manifest["pid"] = ::getpid();
+  manifest["defining_settings"] = experiment.definingSettings();
+  manifest["settings_hash"] = experiment.settingsHash();
+  if (experiment.model() != nullptr) manifest["model_hash"] = experiment.model()->hash;
+  manifest["figures"] = figures(experiment);
+  manifest["commit"] = commit();
+  manifest["versions"] = versions();
+  manifest["machine"] = machine();
+  manifest["tasks"] = Json::array();
+  for (int task = 0; task < experiment.totalTasks(); ++task) {
+    const Split split = experiment.isTestTask(task) ? Split::kTest : Split::kTrain;
+    Json entry = {{"task", task},
+                  {"split", name(split)},
+                  {"name", experiment.family().taskName(task)},
+                  {"description", experiment.family().taskDescription(task)}};
+    if (const auto optimum = experiment.optimalReturn(task)) entry["optimal_return"] = *optimum;
+    manifest["tasks"].push_back(std::move(entry));
+  }
+  return manifest.dump();
+}
+
+std::string manifestText(const std::string& run_dir, const char* key) {
+  const std::string path = run_dir + "/manifest.json";
+  if (!std::filesystem::exists(path)) return "";
+  const auto manifest = Json::parse(readFile(path, "the manifest"), nullptr, false);
+  const bool given = manifest.is_object() && manifest.contains(key) && manifest[key].is_string();
+  return given ? manifest[key].get<std::string>() : "";
+}
+
+std::string otherMachine(const Experiment& experiment) {
+  // tables have no matrix products; portable ones are the same everywhere
+  if (experiment.settings().learner == "q_learning") return "";
+  const bool portable = experiment.settings().arithmetic == "portable";
+  const std::string path = experiment.runDir() + "/manifest.json";
+  if (!std::filesystem::exists(path)) return "";
+  const Json manifest = Json::parse(readFile(path, "the manifest"), nullptr, false);
+  if (!manifest.is_object() || !manifest.contains("machine")) return "";
+  const Json& before = manifest["machine"];
+  const std::map<std::string, std::string> now = machine();
+  for (const char* part : {"products", "processor", "glibc"}) {
+    if (portable && part != std::string("glibc")) continue;
+    if (!before.is_object() || !before.contains(part) || before[part] == now.at(part)) continue;
+    return "the run was begun on another machine (" + std::string(part) + " " +
+           shown(before[part].is_string() ? before[part].get<std::string>() : "") + ", here " +
+           shown(now.at(part)) + "): its numbers may differ from those of a run that stays on one.";
+  }
+  return "";
+}
+
+}  // namespace pmeta
