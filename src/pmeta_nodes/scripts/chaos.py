@@ -34,7 +34,6 @@ EXPERIMENTS = {
     "cart_pole": ["preset:=quick", "updates_per_round:=20", "dqn.hidden:=[32,32]",
                   "dqn.buffer_size:=20000"],
 }
-LAUNCH_ARGUMENTS = ("preset", "seed", "rounds", "pace", "results_dir", "run_id", "key_file")
 PACE = 0.3
 ROUNDS_PER_KILL = 4
 LIMIT = 1200  # seconds for a disturbed run
@@ -167,14 +166,8 @@ class Run:
         return rows_of(self.work / "undisturbed" / self.experiment / "chaos")
 
     def launch_arguments(self):
-        plain, extra = [], []
-        for assignment in self.settings + ["pace:=%g" % PACE,
-                                           "results_dir:=%s" % (self.work / "disturbed"),
-                                           "key_file:=%s" % (self.work.parent / "key")]:
-            key, value = assignment.split(":=", 1)
-            (plain if key in LAUNCH_ARGUMENTS else extra).append(
-                assignment if key in LAUNCH_ARGUMENTS else key + "=" + value)
-        return plain + (["settings:=" + " ".join(extra)] if extra else [])
+        return self.settings + ["pace:=%g" % PACE, "results_dir:=%s" % (self.work / "disturbed"),
+                                "key_file:=%s" % (self.work.parent / "key")]
 
     def environment(self, address, port):
         env = dict(os.environ, ROS_MASTER_URI="http://%s:%d" % (address, port), ROS_IP=address,
