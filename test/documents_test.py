@@ -1,7 +1,6 @@
 """Every command of README.md and docs/: those under a minute are run as they stand, the others with
 --long (then one by one, in the order of the pages). What runs until it is stopped must start."""
 import os
-import pathlib
 import re
 import shlex
 import signal

@@ -5,7 +5,9 @@ import sys
 import numpy as np
 import pytest
 
-import run_folders  # makes the scripts importable
+from programs import TOP
+
+sys.path.insert(0, str(TOP / "src/pmeta_nodes/scripts"))
 import pmeta_statistics as ps
 
 

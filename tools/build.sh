@@ -29,7 +29,7 @@ BUILD=build
 BUILD_OPTIONS=(-DCMAKE_BUILD_TYPE=Release)
 
 build_options() {
-  printf '%s\n' "${BUILD_OPTIONS[@]}" ${MUJOCO_DIR:+"-DMUJOCO_DIR=$MUJOCO_DIR"}
+  printf '%s\n' -DCMAKE_EXPORT_COMPILE_COMMANDS=ON "${BUILD_OPTIONS[@]}" ${MUJOCO_DIR:+"-DMUJOCO_DIR=$MUJOCO_DIR"}
   # once asked for, benchmarks are built with the rest: leaving them out again would configure anew
   if [ -n "${PMETA_BENCHMARKS:-}" ] || grep -qs PMETA_BENCHMARKS "$TOP/$BUILD/options"; then
     echo -DPMETA_BENCHMARKS=ON
@@ -39,7 +39,7 @@ build_options() {
 # What a build depends on, a line each: how it is configured, the commit, which packages are
 # installed, sources.
 inputs() (
-  cd "$TOP"
+  cd "$TOP" || exit
   build_options
   git describe --always --dirty --exclude '*' 2> /dev/null || true
   stat -c '%n %Y' /var/lib/dpkg/status 2> /dev/null || true
@@ -49,7 +49,7 @@ inputs() (
 
 # what came of it
 products() (
-  cd "$TOP"
+  cd "$TOP" || exit
   { find devel -type f -printf '%p %s %T@\n' 2> /dev/null || true; } | LC_ALL=C sort
 )
 

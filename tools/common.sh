@@ -31,7 +31,7 @@ config_of() {
       file=$(realpath "$1") ;;
     *)
       [ -f "$file" ] ||
-        die "unknown experiment '$1'; known are: $(cd "$TOP/config" && ls ./*.yaml | sed 's#\./##; s/\.yaml$//' | xargs)." ;;
+        die "unknown experiment '$1'; known are: $(find "$TOP/config" -maxdepth 1 -name '*.yaml' -printf '%f\n' | sed 's/\.yaml$//' | sort | xargs)." ;;
   esac
   echo "$file"
 }

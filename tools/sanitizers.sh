@@ -42,7 +42,7 @@ sanitize() {
   if [ -z "$reports" ]; then
     echo "no reports of $what"
   else
-    head -n 40 $(head -n 1 <<< "$reports") >&2
+    head -n 40 "$(head -n 1 <<< "$reports")" >&2
     echo "$(wc -l <<< "$reports") reports of $what in $BUILD/reports" >&2
     failed=1
   fi

@@ -19,13 +19,13 @@ command_main() {
   local program=$TOP/devel/lib/pmeta_core/pmeta_bench
   if [ "${1:-}" = --peers ]; then
     ! use_noetic || die "Ubuntu 20.04 has no PyTorch package: bench --peers needs Debian 12."
-    setup $PACKAGES_PEERS
+    setup "${PACKAGES_PEERS[@]}"
     PMETA_BENCHMARKS=1 build
     "$PYTHON" "$TOP/test/bench/peers.py" "$program" "${@:2}"
     return
   fi
   if [ "${1:-}" = --rviz ]; then
-    setup $PACKAGES_SCREENSHOT
+    setup "${PACKAGES_SCREENSHOT[@]}"
     ensure_built
     "$PYTHON" "$TOP/test/bench/rviz_overhead.py" "${@:2}"
     return

@@ -32,7 +32,7 @@ fuzz_one() {
 
 command_main() {
   local seconds=60 targets=() known failed=0 target
-  known=$(cd "$TOP/test/fuzz/corpus" && ls)
+  mapfile -t known < <(ls "$TOP/test/fuzz/corpus")
   while [ $# -gt 0 ]; do
     case $1 in
       --seconds)
@@ -40,22 +40,22 @@ command_main() {
         seconds=$2
         shift ;;
       *)
-        [[ " "$(echo $known)" " == *" $1 "* ]] || die "unknown target '$1'; known are: $(echo $known)."
+        [[ " ${known[*]} " == *" $1 "* ]] || die "unknown target '$1'; known are: ${known[*]}."
         targets+=("$1") ;;
     esac
     shift
   done
-  [ ${#targets[@]} -gt 0 ] || targets=($known)
+  [ ${#targets[@]} -gt 0 ] || targets=("${known[@]}")
   local clang=clang-14 clangxx=clang++-14
   if use_noetic; then
     clang=clang clangxx=clang++
-    setup $PACKAGES_FUZZ_NOETIC
+    setup "${PACKAGES_FUZZ_NOETIC[@]}"
   else
-    setup $PACKAGES_FUZZ_DEBIAN
+    setup "${PACKAGES_FUZZ_DEBIAN[@]}"
   fi
   BUILD=build_fuzz
   # Clang finds no OpenMP of its own here, which oneDNN would need
-  BUILD_OPTIONS=(-DCMAKE_BUILD_TYPE=None -DCMAKE_C_COMPILER=$clang -DCMAKE_CXX_COMPILER=$clangxx
+  BUILD_OPTIONS=(-DCMAKE_BUILD_TYPE=None "-DCMAKE_C_COMPILER=$clang" "-DCMAKE_CXX_COMPILER=$clangxx"
     -DCATKIN_ENABLE_TESTING=OFF -DPMETA_FUZZ=ON -DPMETA_GEMM=eigen
     "-DCMAKE_CXX_FLAGS=-O1 -g1 -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined \
 -fno-omit-frame-pointer")

@@ -26,7 +26,7 @@ rviz_listens() { rostopic info /pmeta/markers 2> /dev/null | grep -q rviz; }
 end_screenshot() {
   local process
   for process in ${LAUNCHED:-} ${SCREEN:-}; do
-    kill "$process" 2> /dev/null && wait "$process" 2> /dev/null || true
+    { kill "$process" && wait "$process"; } 2> /dev/null || true
   done
   rmdir "$SCREENSHOT_DIR" 2> /dev/null || true
 }
@@ -47,7 +47,7 @@ command_main() {
     shift
   done
   [ -d "$(dirname "$file")" ] || die "there is no folder $(dirname "$file") for the picture."
-  setup $PACKAGES_SCREENSHOT
+  setup "${PACKAGES_SCREENSHOT[@]}"
 
   # a short run of its own, where nothing else is asked for
   SCREENSHOT_DIR=$(mktemp -d)

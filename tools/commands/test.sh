@@ -1,4 +1,4 @@
-# Check: set up, build and run every test
+# Check: set up, lint, build and run every test
 #
 # usage: ./pmeta test [--asan | --tsan]
 #
@@ -8,9 +8,14 @@
 #
 # Example: ./pmeta test
 
+. "$TOP/tools/lint.sh"
+
 run_tests() {
   # Ubuntu has no Chromium package but a snap: there the tests that need such programs are skipped
-  use_noetic || setup $PACKAGES_TEST $PACKAGES_SCREENSHOT
+  if ! use_noetic; then
+    setup "${PACKAGES_TEST[@]}" "${PACKAGES_SCREENSHOT[@]}" "${PACKAGES_LINT_QUICK[@]}"
+    lint_quick || die "what is above needs mending; see ./pmeta lint --help."
+  fi
   build all tests
   source_setup "$TOP/devel/setup.bash"
   export ROS_HOME=$TOP/build/ros_home ROSCONSOLE_STDOUT_LINE_BUFFERED=1 ROS_IP=127.0.0.1
