@@ -6,9 +6,9 @@
 #include "pmeta_core/aggregate/mix.h"
 #include "pmeta_core/aggregate/trimmed_mix.h"
 #include "pmeta_core/env/gridworld.h"
-#include "pmeta_core/security/authentication.h"
 #include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/run/task_agent.h"
+#include "pmeta_core/security/authentication.h"
 
 namespace bench {
 namespace {

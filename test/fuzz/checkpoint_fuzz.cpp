@@ -9,9 +9,9 @@
 #include "../core/memory_state.h"
 #include "../core/storage/checkpoint_experiments.h"
 #include "fuzz_support.h"
-#include "pmeta_core/storage/checkpoint.h"
 #include "pmeta_core/run/meta_aggregator.h"
 #include "pmeta_core/run/task_agent.h"
+#include "pmeta_core/storage/checkpoint.h"
 #include "targets.h"
 
 namespace pmeta::fuzz {

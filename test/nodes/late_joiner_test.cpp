@@ -14,7 +14,8 @@ TEST_F(RunOverRos, ALateJoinerIsNamedThenTakesPart) {
   ASSERT_TRUE(waitFor(late));
   EXPECT_EQ(summary_->missing, std::vector<std::uint32_t>{4});
   EXPECT_NE(summary_->message.find("task 4 (grid_8x8)"), std::string::npos) << summary_->message;
-  EXPECT_NE(summary_->message.find("round 1 waits until all 5 tasks have reported"), std::string::npos);
+  EXPECT_NE(summary_->message.find("round 1 waits until all 5 tasks have reported"),
+            std::string::npos);
   EXPECT_EQ(summary_->round, 0u);
 
   const char* arguments[] = {"rosrun",       "pmeta_nodes",          "task_agent", "_task:=4",

@@ -64,7 +64,8 @@ struct Untrained {
     Rng rng(1, 0, Stream::kInitialise);
     networks.initialise(parameters.data(), rng);
   }
-  std::vector<Adaptation> adaptTo(Env& env, const ContextSettings& settings, std::uint64_t seed = 0) const {
+  std::vector<Adaptation> adaptTo(Env& env, const ContextSettings& settings,
+                                  std::uint64_t seed = 0) const {
     Rng rng(seed, 0, Stream::kEvaluate);
     return adapt(networks, settings, parameters.data(), env, rng);
   }
@@ -126,7 +127,8 @@ TEST(Adapt, CountsTheRewardThatMatters) {
   Direction dense(1), sparse(1);
   sparse.sparse = true;
   const ContextSettings settings = smallSettings().context;
-  EXPECT_NE(sac.adaptTo(dense, settings).back().latent, sac.adaptTo(sparse, settings).back().latent);
+  EXPECT_NE(sac.adaptTo(dense, settings).back().latent,
+            sac.adaptTo(sparse, settings).back().latent);
 }
 
 TEST(Adapt, RefusesNetworksWithoutAnEncoder) {

@@ -104,12 +104,12 @@ TEST(FreshEvaluation, FreshEpisodesAreNotThoseOfTheRounds) {
 }
 
 TEST(FreshEvaluation, WritesOneLineForEachRow) {
-  EXPECT_EQ(
-      FreshEvaluation::csv({{"best", 3, PolicyKind::kPersonal, 1, 0, Split::kTrain, {-1.5, 0.25, 100}},
-                            {"last", 4, PolicyKind::kMeta, -1, 2, Split::kTest, {200, 0, 100}}}),
-      "snapshot,round,policy,trained_task,task,split,return_mean,return_std,episodes\n"
-      "best,3,personal,1,0,train,-1.5,0.25,100\n"
-      "last,4,meta,-1,2,test,200,0,100\n");
+  EXPECT_EQ(FreshEvaluation::csv(
+                {{"best", 3, PolicyKind::kPersonal, 1, 0, Split::kTrain, {-1.5, 0.25, 100}},
+                 {"last", 4, PolicyKind::kMeta, -1, 2, Split::kTest, {200, 0, 100}}}),
+            "snapshot,round,policy,trained_task,task,split,return_mean,return_std,episodes\n"
+            "best,3,personal,1,0,train,-1.5,0.25,100\n"
+            "last,4,meta,-1,2,test,200,0,100\n");
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 #include <stdexcept>
 
 #include "../support.h"
-#include "checkpoint_experiments.h"
 #include "pmeta_core/run/local_runner.h"
+#include "storage/checkpoint_experiments.h"
 
 namespace pmeta {
 namespace {

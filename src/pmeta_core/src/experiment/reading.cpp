@@ -125,8 +125,8 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
                              const std::vector<std::string>& overrides, const std::string& folder) {
   const std::vector<YAML::Node> files = choosePreset(root, source, overrides);
   // first, since it may bring what the settings name
-  const std::string library = peek(
-      {}, overrides, "", "library", anchored(peek(files, {}, "", "library", ""), folder));
+  const std::string library =
+      peek({}, overrides, "", "library", anchored(peek(files, {}, "", "library", ""), folder));
   if (!library.empty()) loadLibrary(absolutePath("library", library));
   Experiment experiment;
   const std::string learner = peek(files, overrides, "", "learner", experiment.settings_.learner);

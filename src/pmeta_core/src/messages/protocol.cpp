@@ -31,7 +31,9 @@ std::vector<int> readTasks(StateReader& reader, const std::string& name) {
 
 }  // namespace
 
-const char* name(PolicyKind policy) { return policy == PolicyKind::kPersonal ? "personal" : "meta"; }
+const char* name(PolicyKind policy) {
+  return policy == PolicyKind::kPersonal ? "personal" : "meta";
+}
 const char* name(Split split) { return split == Split::kTrain ? "train" : "test"; }
 
 std::string otherSettings(const std::string& who, const std::string& theirs,

@@ -1,7 +1,7 @@
+#include "agent/task_agent_node.h"
+#include "common/private_param.h"
 #include "common/run_node.h"
 #include "pmeta_core/base/error.h"
-#include "common/private_param.h"
-#include "agent/task_agent_node.h"
 
 namespace {
 

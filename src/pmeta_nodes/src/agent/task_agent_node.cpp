@@ -189,7 +189,8 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     setState(AgentStatus::EVALUATING,
              "evaluating the meta-policy of round " + std::to_string(meta.round));
     for (const pmeta::TaskReturn& result : agent_.evaluateMeta(meta)) deliver(result);
-    if (trajectory_pub_) publishEpisode(agent_.recordMeta(meta), meta.round, pmeta::PolicyKind::kMeta);
+    if (trajectory_pub_)
+      publishEpisode(agent_.recordMeta(meta), meta.round, pmeta::PolicyKind::kMeta);
   }
   if (meta.round >= rounds) {
     setState(AgentStatus::DONE, "all " + std::to_string(rounds) + " rounds are done");
@@ -319,7 +320,8 @@ void TaskAgentNode::deliver(pmeta::AuxiliaryUpdate update) {
   next_resend_ = Clock::now() + resend_wait_;
 }
 
-void TaskAgentNode::publishEpisode(const pmeta::Episode& episode, int round, pmeta::PolicyKind policy) {
+void TaskAgentNode::publishEpisode(const pmeta::Episode& episode, int round,
+                                   pmeta::PolicyKind policy) {
   pmeta_msgs::Trajectory msg = toMsg(episode, experiment_, agent_.task(), round, policy);
   msg.header.stamp = ros::Time::now();
   trajectory_pub_.publish(msg);

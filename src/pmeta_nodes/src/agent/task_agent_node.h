@@ -21,12 +21,12 @@
 #include "common/health.h"
 #include "common/mailbox.h"
 #include "common/news_order.h"
-#include "pmeta_core/security/authentication.h"
-#include "pmeta_core/storage/checkpoint.h"
-#include "pmeta_core/experiment/experiment.h"
-#include "pmeta_core/run/task_agent.h"
 #include "common/recent_returns.h"
 #include "common/refusals.h"
+#include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/run/task_agent.h"
+#include "pmeta_core/security/authentication.h"
+#include "pmeta_core/storage/checkpoint.h"
 
 namespace pmeta_nodes {
 

@@ -1,7 +1,7 @@
 #include "aggregator/meta_aggregator_node.h"
+#include "common/private_param.h"
 #include "common/run_node.h"
 #include "pmeta_core/base/error.h"
-#include "common/private_param.h"
 
 namespace {
 

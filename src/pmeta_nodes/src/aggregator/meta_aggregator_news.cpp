@@ -5,11 +5,11 @@
 #include <iterator>
 #include <utility>
 
-#include "common/conversions.h"
 #include "aggregator/meta_aggregator_node.h"
 #include "aggregator/onlookers.h"
-#include "pmeta_core/base/error.h"
+#include "common/conversions.h"
 #include "common/private_param.h"
+#include "pmeta_core/base/error.h"
 
 namespace pmeta_nodes {
 namespace {

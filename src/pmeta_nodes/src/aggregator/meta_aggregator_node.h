@@ -20,16 +20,16 @@
 #include <variant>
 #include <vector>
 
+#include "aggregator/roll_call.h"
 #include "common/health.h"
 #include "common/mailbox.h"
+#include "common/refusals.h"
+#include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/run/console.h"
+#include "pmeta_core/run/meta_aggregator.h"
 #include "pmeta_core/security/authentication.h"
 #include "pmeta_core/storage/checkpoint.h"
-#include "pmeta_core/run/console.h"
-#include "pmeta_core/experiment/experiment.h"
-#include "pmeta_core/run/meta_aggregator.h"
 #include "pmeta_core/storage/run_log.h"
-#include "common/refusals.h"
-#include "aggregator/roll_call.h"
 
 namespace pmeta_nodes {
 

@@ -4,8 +4,8 @@
 
 #include <map>
 
-#include "pmeta_core/base/settings.h"
 #include "launch/xml_rpc.h"
+#include "pmeta_core/base/settings.h"
 
 namespace pmeta_nodes {
 namespace {

@@ -160,7 +160,7 @@ pmeta_msgs::TaskReturn toMsg(const pmeta::TaskReturn& result, const std::string&
   msg.task_name = task_name;
   msg.round = static_cast<std::uint32_t>(result.round);
   msg.policy = result.policy == pmeta::PolicyKind::kPersonal ? pmeta_msgs::TaskReturn::PERSONAL
-                                                         : pmeta_msgs::TaskReturn::META;
+                                                             : pmeta_msgs::TaskReturn::META;
   msg.split = result.split == pmeta::Split::kTrain ? pmeta_msgs::TaskReturn::TRAIN
                                                    : pmeta_msgs::TaskReturn::TEST;
   msg.scheduled = static_cast<std::uint8_t>(result.scheduled);
@@ -216,7 +216,7 @@ pmeta_msgs::Trajectory toMsg(const pmeta::Episode& episode, const pmeta::Experim
   msg.environment = experiment.settings().environment;
   msg.round = static_cast<std::uint32_t>(round);
   msg.policy = policy == pmeta::PolicyKind::kPersonal ? pmeta_msgs::Trajectory::PERSONAL
-                                                  : pmeta_msgs::Trajectory::META;
+                                                      : pmeta_msgs::Trajectory::META;
   msg.observation_size = static_cast<std::uint32_t>(episode.observation_size);
   msg.observations = episode.observations;
   msg.action_size = static_cast<std::uint32_t>(episode.action_size);

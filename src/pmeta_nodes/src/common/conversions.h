@@ -10,10 +10,10 @@
 #include <pmeta_msgs/Trajectory.h>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/personal/personal_learner.h"
-#include "pmeta_core/security/authentication.h"
 #include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/messages/protocol.h"
+#include "pmeta_core/personal/personal_learner.h"
+#include "pmeta_core/security/authentication.h"
 #include "pmeta_core/storage/run_log.h"
 
 namespace pmeta_nodes {

@@ -9,9 +9,9 @@
 
 #include "common/free_memory.h"
 #include "common/master_watch.h"
+#include "common/private_param.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/process.h"
-#include "common/private_param.h"
 
 namespace pmeta_nodes {
 namespace {

@@ -6,9 +6,9 @@
 #include <cstdlib>
 
 #include "launch/launch_parent.h"
+#include "launch/xml_rpc.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/experiment/experiment.h"
-#include "launch/xml_rpc.h"
 
 namespace pmeta_nodes {
 namespace {

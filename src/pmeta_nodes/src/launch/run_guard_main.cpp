@@ -9,10 +9,10 @@
 #include <cstdio>
 
 #include "common/conversions.h"
-#include "launch/launch_parent.h"
 #include "common/news_order.h"
-#include "common/run_node.h"
 #include "common/private_param.h"
+#include "common/run_node.h"
+#include "launch/launch_parent.h"
 
 namespace {
 

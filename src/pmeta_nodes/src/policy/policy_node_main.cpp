@@ -2,11 +2,11 @@
 #include <cstring>
 #include <iostream>
 
+#include "common/private_param.h"
 #include "common/run_node.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/process.h"
 #include "policy/policy_node.h"
-#include "common/private_param.h"
 
 namespace {
 

@@ -9,8 +9,8 @@
 #include <ros/ros.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 
-#include "view/playback.h"
 #include "common/recent_returns.h"
+#include "view/playback.h"
 #include "view/scene.h"
 
 namespace pmeta_nodes {

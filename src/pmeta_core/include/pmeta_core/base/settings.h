@@ -70,8 +70,8 @@ class Settings {
   /// Every setting as YAML text, in binding order. Reading it again gives the same values.
   std::string yaml() const;
 
-  /// An aligned table for people: key, value, "(default)" where unchanged; on request with meanings,
-  /// and with the default where changed.
+  /// An aligned table for people: key, value, "(default)" where unchanged; on request with
+  /// meanings, and with the default where changed.
   std::string table(bool with_docs = false) const;
 
  private:

@@ -37,7 +37,7 @@ enum class PolicyKind { kPersonal, kMeta };
 enum class Split { kTrain, kTest };
 
 const char* name(PolicyKind policy);  ///< "personal", "meta"
-const char* name(Split split);    ///< "train", "test"
+const char* name(Split split);        ///< "train", "test"
 
 /// Result of one evaluation of one policy on one task.
 struct TaskReturn {

@@ -26,8 +26,8 @@ class RunConsole {
   /// in order.
   std::string take(const RoundBook::Round& round);
 
-  /// Takes the rounds that a run has behind it when it goes on, from its rounds.csv; nothing is said
-  /// of them but in the table. Throws Error if the file is altered.
+  /// Takes the rounds that a run has behind it when it goes on, from its rounds.csv; nothing is
+  /// said of them but in the table. Throws Error if the file is altered.
   void recall(const std::string& rounds_csv);
 
   /// PP and MP of every task and their means: of the last evaluated round, and the best with its

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "pmeta_core/messages/protocol.h"
-#include "pmeta_core/storage/run_log.h"
 #include "pmeta_core/run/task_agent.h"
+#include "pmeta_core/storage/run_log.h"
 
 namespace pmeta {
 

@@ -7,8 +7,8 @@
 #include "pmeta_core/env/env.h"
 #include "pmeta_core/env/tabular_env.h"
 #include "pmeta_core/experiment/experiment.h"
-#include "pmeta_core/storage/policy_file.h"
 #include "pmeta_core/messages/protocol.h"
+#include "pmeta_core/storage/policy_file.h"
 
 namespace pmeta {
 

@@ -7,8 +7,8 @@
 #include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/run/fresh_evaluation.h"
 #include "pmeta_core/run/meta_aggregator.h"
-#include "pmeta_core/storage/run_log.h"
 #include "pmeta_core/run/task_agent.h"
+#include "pmeta_core/storage/run_log.h"
 
 namespace pmeta {
 

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "pmeta_core/run/divergence.h"
 #include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/messages/protocol.h"
+#include "pmeta_core/run/divergence.h"
 
 namespace pmeta {
 

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "pmeta_core/security/key_file.h"
 #include "pmeta_core/messages/protocol.h"
+#include "pmeta_core/security/key_file.h"
 
 namespace pmeta {
 
