@@ -69,7 +69,7 @@ TEST(SweepPlan, UnlikeSettingsGetUnlikeFolders) {
             "experiment: cheetah\nlearner: sac\nenvironment: {name: half_cheetah_dir}\n");
   std::filesystem::create_directory(dir / "m");
   for (const char* name : {"m/a.xml", "m_a.xml"}) {
-    writeFile(dir / name, shippedModel("half_cheetah") + "<!-- " + name + " -->\n");
+    writeFile(dir / name, shippedModel("half_cheetah") + std::string("<!-- ") + name + " -->\n");
   }
   SweepPlan plan;
   plan.name = "plan";

@@ -59,7 +59,7 @@ bool parseNumber(const YAML::Node& node, double& value) {
 // what is allowed of a whole number; with the largest there is, where that is what was passed
 std::string allowedWhole(const YAML::Node& node, const std::string& allowed, std::int64_t most) {
   double number = 0;
-  const bool beyond = parseNumber(node, number) && number > static_cast<double>(most / 2);
+  const bool beyond = parseNumber(node, number) && number > 0.5 * static_cast<double>(most);
   return beyond ? allowed + ", at most " + std::to_string(most) : allowed;
 }
 
@@ -221,7 +221,7 @@ void Settings::bind(const std::string& key, bool& value, const std::string& doc)
 }
 
 void Settings::bind(const std::string& key, std::string& value, const std::string& doc,
-                    std::vector<std::string> choices) {
+                    const std::vector<std::string>& choices) {
   const std::string allowed = choices.empty() ? "text" : "one of " + join(choices);
   add({key, doc, allowed, "",
        [=, &value](const YAML::Node& node, const std::string& where) {

@@ -48,7 +48,7 @@ class Settings {
   void bind(const std::string& key, bool& value, const std::string& doc);
   /// `choices`: the allowed words; empty means any text.
   void bind(const std::string& key, std::string& value, const std::string& doc,
-            std::vector<std::string> choices = {});
+            const std::vector<std::string>& choices = {});
   /// `range` holds for each element of a list.
   void bind(const std::string& key, std::vector<int>& value, const std::string& doc,
             Range range = {}, Empty empty = Empty::kRefused);
