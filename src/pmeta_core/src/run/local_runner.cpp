@@ -1,82 +1,66 @@
 #include "pmeta_core/run/local_runner.h"
 
-#include <chrono>
 #include <limits>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/run/round_driver.h"
 #include "pmeta_core/storage/checkpoint.h"
 #include "pmeta_core/storage/policy_file.h"
 
 namespace pmeta {
 namespace {
 
+using Clock = RoundDriver::Clock;
+
 /// All parties of a run in one process, round by round.
-class LocalRun {
+class LocalRun : private RoundOutlet {
  public:
-  explicit LocalRun(const Experiment& experiment)
+  /// log: none is written if it is null.
+  LocalRun(const Experiment& experiment, RunLog* log)
       : experiment_(experiment),
-        aggregator_(experiment),
-        book_(experiment),
-        keeps_(experiment.settings().fresh_episodes > 0) {
+        log_(log),
+        keeps_(experiment.settings().fresh_episodes > 0),
+        // nobody is late in one process
+        driver_(experiment, RoundTimes(), *this, Clock::now()) {
     for (int task = 0; task < experiment.totalTasks(); ++task)
       agents_.emplace_back(experiment, task);
-    folders_.emplace_back(experiment, kAggregator, aggregator_.metaPolicy().model.layout);
+    folders_.emplace_back(experiment, kAggregator, meta().model.layout);
     for (const TaskAgent& agent : agents_) {
       if (agent.trains()) folders_.emplace_back(experiment, agent.task(), agent.layout());
     }
   }
 
-  int round() const { return aggregator_.metaPolicy().round; }
-  bool complete() const { return book_.roundsTaken() == round(); }
-  int roundsTaken() const { return book_.roundsTaken(); }
+  const RoundDriver& rounds() const { return driver_; }
+  const MetaPolicy& meta() const { return driver_.aggregator().metaPolicy(); }
   const std::vector<CheckpointFolder>& folders() const { return folders_; }
 
-  void train() {
-    const auto start = std::chrono::steady_clock::now();
-    const int round = this->round() + 1;
-    for (TaskAgent& agent : agents_) {
-      if (!agent.trains()) continue;
-      auto trained = agent.trainRound(aggregator_.metaPolicy());
-      if (trained->personal) book_.add(*trained->personal);
-      const MetaAggregator::Answer answer =
-          aggregator_.offer(std::make_shared<AuxiliaryUpdate>(std::move(trained->update)));
-      if (answer.verdict != MetaAggregator::Verdict::kAccepted) throw Error(answer.reason);
-    }
-    const std::vector<int> missing = aggregator_.closeRound();
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    book_.closeRound(round, aggregator_.metaPolicy().participants, missing, seconds.count(),
-                     aggregator_.excluded());
-  }
+  void begin() { driver_.begin(Clock::now()); }
 
-  // the record of the round that has been trained, once the meta-policy is evaluated
-  std::vector<RoundBook::Round> record() {
-    for (TaskAgent& agent : agents_) {
-      if (!experiment_.evaluatesMeta()) break;
-      for (const TaskReturn& result : agent.evaluateMeta(aggregator_.metaPolicy())) {
-        book_.add(result);
-      }
-    }
-    std::vector<RoundBook::Round> done = book_.take();
-    if (done.empty()) throw std::logic_error("a round without all of its returns");
-    for (const RoundBook::Round& round : done) {
-      if (keeps_ && !round.rows.empty()) fresh_.offer(round, agents_, aggregator_.metaPolicy());
-    }
-    return done;
+  /// Trains a round, unless one was that is not recorded yet, and gives the record.
+  RoundBook::Round nextRound() {
+    if (driver_.book().roundsTaken() == driver_.round()) train();
+    if (experiment_.evaluatesMeta()) evaluateMeta();
+    step();
+    if (!written_) throw std::logic_error("a round without all of its returns");
+    return *std::exchange(written_, std::nullopt);
   }
 
   // the aggregator's last: where it is, all are
-  void saveCheckpoints() const {
-    for (std::size_t i = 1; i < folders_.size(); ++i) {
-      folders_[i].save(round(), agents_[i - 1]);
-    }
-    folders_[0].save(round(), *this);
+  void saveCheckpoint(int round) override {
+    if (log_ == nullptr) return;
+    log_->sync();
+    for (std::size_t i = 1; i < folders_.size(); ++i) folders_[i].save(round, agents_[i - 1]);
+    folders_[0].save(round, *this);
   }
 
   void loadCheckpoints(int round) {
     for (std::size_t i = 1; i < folders_.size(); ++i) folders_[i].load(round, agents_[i - 1]);
     folders_[0].load(round, *this);
-    if (this->round() != round || book_.roundsTaken() < round - 1 || book_.roundsTaken() > round) {
+    const int taken = driver_.book().roundsTaken();
+    if (driver_.round() != round || taken < round - 1 || taken > round) {
       throw Error("the checkpoint " + folders_[0].path(round) +
                   " cannot be used: its rounds contradict each other.");
     }
@@ -88,27 +72,23 @@ class LocalRun {
   }
 
   void savePolicies() const {
-    const MetaPolicy& meta = aggregator_.metaPolicy();
-    saveRunPolicy(experiment_, PolicyKind::kMeta, -1, meta.round, meta.model);
+    const int round = driver_.round();
+    saveRunPolicy(experiment_, PolicyKind::kMeta, -1, round, meta().model);
     for (const TaskAgent& agent : agents_) {
       if (!agent.trains()) continue;
-      saveRunPolicy(experiment_, PolicyKind::kPersonal, agent.task(), meta.round, agent.personal(),
+      saveRunPolicy(experiment_, PolicyKind::kPersonal, agent.task(), round, agent.personal(),
                     agent.taskInput());
     }
   }
 
-  const Model& meta() const { return aggregator_.metaPolicy().model; }
-
   // what is the aggregator's
   void saveState(StateWriter& writer) const {
-    writer.part("aggregator", aggregator_);
-    writer.part("book", book_);
+    driver_.saveState(writer);
     if (keeps_) writer.part("fresh", fresh_);
   }
 
   void loadState(StateReader& reader) {
-    reader.part("aggregator", aggregator_);
-    reader.part("book", book_);
+    driver_.loadState(reader);
     Fresh fresh{fresh_, agents_};
     if (keeps_) reader.part("fresh", fresh);
   }
@@ -120,39 +100,62 @@ class LocalRun {
     void loadState(StateReader& reader) { evaluation.loadState(reader, agents); }
   };
 
+  void train() {
+    for (TaskAgent& agent : agents_) {
+      if (!agent.trains()) continue;
+      auto trained = agent.trainRound(meta());
+      if (trained->personal) driver_.add(*trained->personal);
+      const MetaAggregator::Answer answer =
+          driver_.offer(std::make_shared<AuxiliaryUpdate>(std::move(trained->update)));
+      if (answer.verdict != MetaAggregator::Verdict::kAccepted) throw Error(answer.reason);
+    }
+    step();
+  }
+
+  void evaluateMeta() {
+    for (TaskAgent& agent : agents_) {
+      for (const TaskReturn& result : agent.evaluateMeta(meta())) driver_.add(result);
+    }
+  }
+
+  // nobody would mend the disk and have the run wait for it: it can be resumed
+  void step() {
+    driver_.step(Clock::now());
+    if (!driver_.diskTrouble().empty()) throw Error(driver_.diskTrouble());
+  }
+
+  void publish(const MetaPolicy&) override {}  // agents look at meta()
+
+  void write(const RoundBook::Round& round) override {
+    if (keeps_ && !round.rows.empty()) fresh_.offer(round, agents_, meta());
+    if (log_ != nullptr) log_->write(round);
+    written_ = round;
+  }
+
   const Experiment& experiment_;
-  MetaAggregator aggregator_;
-  RoundBook book_;
+  RunLog* log_;
+  bool keeps_;  // policies, for fresh episodes
+  RoundDriver driver_;
   std::vector<TaskAgent> agents_;          // those that train first
   std::vector<CheckpointFolder> folders_;  // the aggregator's, then those of agents that train
-  bool keeps_;                             // policies, for fresh episodes
   FreshEvaluation fresh_;
+  std::optional<RoundBook::Round> written_;  // and not given out yet
 };
 
 LocalResult runRounds(const Experiment& experiment, RunLog* log, const OnRound& on_round,
                       int resumed_round) {
-  LocalRun run(experiment);
+  LocalRun run(experiment, log);
   if (resumed_round > 0) run.loadCheckpoints(resumed_round);
-  const auto save = [&] {
-    log->sync();
-    run.saveCheckpoints();
-  };
-
-  const int rounds = experiment.settings().rounds;
+  run.begin();
   LocalResult result;
-  while ((run.round() < rounds || !run.complete()) && !result.stopped) {
-    if (run.complete()) {
-      run.train();
-      if (log != nullptr && experiment.checkpointsAfter(run.round())) save();
-    }
-    for (RoundBook::Round& done : run.record()) {
-      if (log != nullptr) log->write(done);
-      if (on_round && !on_round(done)) result.stopped = run.round() < rounds;
-      result.rounds.push_back(std::move(done));
-    }
+  while (!run.rounds().done() && !result.stopped) {
+    result.rounds.push_back(run.nextRound());
+    if (on_round && !on_round(result.rounds.back())) result.stopped = !run.rounds().done();
   }
   // so that a run that is stopped goes on from where it stopped
-  if (result.stopped && log != nullptr && experiment.settings().checkpoint_interval > 0) save();
+  if (result.stopped && experiment.settings().checkpoint_interval > 0) {
+    run.saveCheckpoint(run.rounds().round());
+  }
 
   if (experiment.settings().fresh_episodes > 0 && !result.stopped) {
     result.fresh = run.evaluateFresh();
@@ -161,7 +164,7 @@ LocalResult runRounds(const Experiment& experiment, RunLog* log, const OnRound& 
     }
   }
   if (log != nullptr) run.savePolicies();
-  result.meta = run.meta();
+  result.meta = run.meta().model;
   return result;
 }
 
@@ -181,7 +184,7 @@ ResumePoint findResumePoint(const Experiment& experiment) {
   requireUnfinished(experiment.runDir());
   ResumePoint point;
   for (int at_most = std::numeric_limits<int>::max();; at_most = point.round - 1) {
-    LocalRun run(experiment);
+    LocalRun run(experiment, nullptr);
     point.round = newestCommonRound(run.folders(), point.refused, at_most);
     if (point.round == 0) {
       throw Error("there is no round of which all parties have a good checkpoint in " +
@@ -190,7 +193,7 @@ ResumePoint findResumePoint(const Experiment& experiment) {
     }
     try {
       run.loadCheckpoints(point.round);
-      point.rounds_done = run.roundsTaken();
+      point.rounds_done = run.rounds().book().roundsTaken();
       return point;
     } catch (const Error& error) {
       // whole and of this run, but of no state that it can be in: the one before may be

@@ -51,7 +51,7 @@ bool MetaAggregator::giveUp(int task, const std::string& reason) {
 
 std::string MetaAggregator::hopeless() const {
   if (failures_.empty()) return "";
-  const int tasks = static_cast<int>(updates_.size());
+  const int tasks = expected();
   // training tasks come first
   const auto lost =
       static_cast<int>(std::distance(failures_.begin(), failures_.lower_bound(tasks)));
@@ -98,6 +98,11 @@ std::string MetaAggregator::refusal(const AuxiliaryUpdate& update) const {
   }
   const std::string diverged = divergence(update.model);
   return diverged.empty() ? "" : who + " sent parameters that have diverged: " + diverged + ".";
+}
+
+void MetaAggregator::ask(bool evaluate, bool checkpoint) {
+  meta_.evaluate = evaluate;
+  meta_.checkpoint = checkpoint;
 }
 
 std::vector<int> MetaAggregator::reported() const {

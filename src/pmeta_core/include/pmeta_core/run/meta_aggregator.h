@@ -55,8 +55,13 @@ class MetaAggregator {
   /// The meta-policy after the rounds closed so far.
   const MetaPolicy& metaPolicy() const { return meta_; }
 
-  std::vector<int> reported() const;  ///< tasks in, ascending
-  std::vector<int> missing() const;   ///< tasks still out, ascending
+  /// What is to go out with it.
+  void ask(bool evaluate, bool checkpoint);
+
+  int expected() const { return static_cast<int>(updates_.size()); }  ///< updates of a full round
+  int quorum() const { return quorum_; }                              ///< that suffice once late
+  std::vector<int> reported() const;                                  ///< tasks in, ascending
+  std::vector<int> missing() const;  ///< tasks still out, ascending
   bool complete() const { return missing().empty(); }
   bool hasQuorum() const { return static_cast<int>(reported().size()) >= quorum_; }
 

@@ -1,14 +1,14 @@
-#include "aggregator/roll_call.h"
+#include "pmeta_core/run/roll_call.h"
 
 #include <gtest/gtest.h>
 
-namespace pmeta_nodes {
+namespace pmeta {
 namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-const RollCall::Clock::time_point kStart{};
+const RollCall::Time kStart{};
 
 RollCall makeCall() { return RollCall(3, milliseconds(1500), seconds(10), kStart); }
 
@@ -40,4 +40,4 @@ TEST(RollCall, IgnoresAgentsThatDoNotExist) {
 }
 
 }  // namespace
-}  // namespace pmeta_nodes
+}  // namespace pmeta
