@@ -7,7 +7,7 @@
 #include "../support.h"
 #include "pmeta_core/env/mountain_car.h"
 #include "pmeta_core/experiment/results_dir.h"
-#include "pmeta_core/personal/dqn_personal_learner.h"
+#include "pmeta_core/learn/dqn.h"
 
 namespace pmeta {
 namespace {
@@ -89,16 +89,17 @@ TEST(Experiment, PooledIsIndependentOnTheEnvironmentsOfAllTasks) {
   EXPECT_TRUE(e.keepsPersonal());
   EXPECT_EQ(e.settings().aggregation.beta, 0);
   const auto learner = e.makeLearner(0);
-  const auto& envs = dynamic_cast<DqnPersonalLearner&>(*learner).learner().envs();
-  ASSERT_EQ(envs.size(), 4u);
+  const auto& dqn = dynamic_cast<const DqnLearner&>(learner->learner());
+  ASSERT_EQ(dqn.numEnvs(), 4u);
   for (int k = 0; k < 4; ++k) {
-    EXPECT_EQ(dynamic_cast<MountainCar&>(*envs[k]).task().zeta, k % 2 == 0 ? 3 : 5);
+    EXPECT_EQ(dynamic_cast<const MountainCar&>(dqn.env(k)).task().zeta, k % 2 == 0 ? 3 : 5);
   }
   EXPECT_EQ(
       errorOf([&] { Experiment::parse(cars, "test", {"num_envs:=1"}); }),
       "algorithm pooled needs at least one environment a task: set dqn.num_envs to 2 or more.");
   EXPECT_EQ(refused({"algorithm:=pooled"}),
-            "algorithm pooled needs learner dqn, which trains in several environments.");
+            "algorithm pooled needs a learner that trains in several environments; q_learning "
+            "does not.");
 }
 
 TEST(Experiment, UnstableStepSizesAreRefused) {
@@ -425,7 +426,7 @@ TEST(Learner, MustFitTheEnvironment) {
   const auto tabular = Experiment::parse("environment: {name: cart_pole}", "test");
   EXPECT_EQ(errorOf([&] { tabular.makeLearner(0); }),
             "environment 'cart_pole' is not tabular, so q_learning cannot learn it: choose "
-            "learner:=dqn.");
+            "another learner.");
 }
 
 TEST(Learner, SettingsOfOthersAreUnknown) {
@@ -435,6 +436,26 @@ TEST(Learner, SettingsOfOthersAreUnknown) {
               Experiment::parse("learner: dqn\nq_learning: {gamma: 0}", "test");
             }).find("unknown setting"),
             std::string::npos);
+}
+
+TEST(Learner, UnknownOnesAreToldTheKnownOnes) {
+  EXPECT_EQ(
+      errorOf([] { Experiment::parse("learner: sca", "test"); }),
+      "unknown learner 'sca': did you mean 'sac'? Known are " + join(learners().names()) + ".");
+}
+
+TEST(Learner, ANetworkMayHaveALambdaOfItsOwn) {
+  const auto load = [](const std::string& own) {
+    return Experiment::parse(
+        "learner: sac\nenvironment: {name: sparse_point_robot}\n"
+        "personal: {lambda_critic: " +
+            own + "}",
+        "test");
+  };
+  EXPECT_FALSE(load("-1").settings().personal.lambdas.critic.has_value());
+  EXPECT_EQ(load("0").settings().personal.lambdas.critic, 0);
+  EXPECT_NE(load("-1").yaml().find("lambda_critic: -1\n"), std::string::npos);
+  EXPECT_NE(errorOf([&] { load("-0.5"); }).find("a number, at least 0, or -1"), std::string::npos);
 }
 
 TEST(Stability, OfNetworksOnlyThePullCounts) {

@@ -155,7 +155,7 @@ class Reference {
  private:
   // the rows of one context: of a window from the oldest kept transition on, or of all
   std::vector<Vector> context(Rng& rng) const {
-    const ReplayBuffer& kept = learner_.context();
+    const ReplayBuffer& kept = learner_.context().kept();
     std::vector<std::size_t> slots(kept.size());
     std::iota(slots.begin(), slots.end(), 0);
     const auto window = static_cast<std::size_t>(settings_.context.window);

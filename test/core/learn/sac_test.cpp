@@ -109,7 +109,8 @@ TEST(Sac, ContextIsWarmUpAndPriorEpisodesInTheRewardThatCounts) {
   for (int i = 0; i < 2000; ++i) {
     trainer.learner.collect(trainer.parameters.data(), trainer.rng);
   }
-  const ReplayBuffer &replay = trainer.learner.replay(), &context = trainer.learner.context();
+  const ReplayBuffer &replay = trainer.learner.replay(),
+                     &context = trainer.learner.context().kept();
   // walk through the replay and say which transitions should be context
   std::size_t at = 0;
   int episode = 0;  // after the warm-up's last
@@ -139,7 +140,8 @@ TEST(Sac, PosteriorEpisodesAreContextWhereAskedFor) {
   for (int i = 0; i < 200; ++i) {
     trainer.learner.collect(trainer.parameters.data(), trainer.rng);
   }
-  const ReplayBuffer &replay = trainer.learner.replay(), &context = trainer.learner.context();
+  const ReplayBuffer &replay = trainer.learner.replay(),
+                     &context = trainer.learner.context().kept();
   ASSERT_EQ(context.size(), replay.size());
   for (std::size_t k = 0; k < replay.size(); ++k) {
     ASSERT_EQ(context[k].observation[0], replay[k].observation[0]) << k;
@@ -164,23 +166,23 @@ TEST(Sac, TheExplorerActsInPriorEpisodesOnly) {
   const SacLearner& learner = trainer.learner;
   const SacNetworks& networks = learner.networks();
   const std::vector<float> explorer(networks.actor().size(), 0.1f);
-  SacNetworks::ActorWorkspace workspace(networks, 1);
-  GaussianPolicy policy(networks.actionSize(), 1);
   trainer.learner.collect(trainer.parameters.data(), trainer.rng, explorer.data());
   int in_prior = 0;
   for (int i = 0; i < 400; ++i) {
     const std::vector<float> z = learner.taskInput();
-    const std::size_t context = learner.context().size();
+    const std::size_t context = learner.context().kept().size();
     Rng same = trainer.rng;
     trainer.learner.collect(trainer.parameters.data(), trainer.rng, explorer.data());
-    const bool prior = learner.context().size() > context;
+    const bool prior = learner.context().kept().size() > context;
     in_prior += prior;
     const Transition t = learner.replay()[learner.replay().size() - 1];
-    policy.sample(networks.heads(prior ? explorer.data() : trainer.parameters.data(), t.observation,
-                                 1, z.data(), workspace),
-                  1, same);
+    GaussianActor actor(networks.actor(), z, 1, GaussianActor::By::kSample,
+                        prior ? explorer.data() : trainer.parameters.data());
+    std::vector<double> action(networks.actionSize());
+    actor.look(t.observation, {0});
+    actor.act(0, same, action.data());
     for (std::size_t j = 0; j < networks.actionSize(); ++j) {
-      ASSERT_EQ(t.action[j], policy.actions()[j]) << "step " << i << (prior ? ", prior" : "");
+      ASSERT_EQ(t.action[j], action[j]) << "step " << i << (prior ? ", prior" : "");
     }
   }
   EXPECT_GT(in_prior, 100);
@@ -191,17 +193,17 @@ TEST(Sac, GreedyActionsAreTanhOfTheMean) {
   const Trainer trainer(smallSettings("one_hot"));
   const SacNetworks& networks = trainer.learner.networks();
   const std::vector<float> observations = {0.1f, 0.2f, 0.3f, -1, 1, 0.5f};
-  SacNetworks::ActorWorkspace workspace(networks, 2);
-  double actions[4];
-  networks.greedyActions(trainer.parameters.data(), observations.data(), 2,
-                         trainer.learner.taskInput().data(), workspace, actions);
+  GaussianActor actor(networks.actor(), trainer.learner.taskInput(), 2, GaussianActor::By::kMean,
+                      trainer.parameters.data());
+  Rng none(0, 0, Stream::kEvaluate);
+  actor.look(observations.data(), {0, 1});
   for (std::size_t b = 0; b < 2; ++b) {
+    double action[2];
+    EXPECT_TRUE(actor.act(b, none, action));
     const Vector heads =
         outputs(networks.actor(), trainer.parameters.data(),
                 {observations[3 * b], observations[3 * b + 1], observations[3 * b + 2], 0, 1, 0});
-    for (std::size_t j = 0; j < 2; ++j) {
-      EXPECT_NEAR(actions[2 * b + j], std::tanh(heads[j]), 1e-6);
-    }
+    for (std::size_t j = 0; j < 2; ++j) EXPECT_NEAR(action[j], std::tanh(heads[j]), 1e-6);
   }
 }
 
@@ -276,17 +278,15 @@ class WayHome : public Env {
 // mean return of tanh(mean) over some episodes
 double greedyReturn(const SacNetworks& networks, const float* parameters, Env& env,
                     const std::vector<float>& task_input) {
-  SacNetworks::ActorWorkspace workspace(networks, 1);
   Rng rng(3, 0, Stream::kEvaluate);
-  std::vector<double> observation(networks.observationSize()), action(networks.actionSize());
+  std::vector<double> observation(networks.observationSize());
   double sum = 0;
   for (int episode = 0; episode < 10; ++episode) {
     Step step;
     env.reset(rng, observation.data());
     while (!step.terminated && !step.truncated) {
       const std::vector<float> seen(observation.begin(), observation.end());
-      networks.greedyActions(parameters, seen.data(), 1, task_input.data(), workspace,
-                             action.data());
+      const std::vector<double> action = test::greedyAction(networks, parameters, seen, task_input);
       step = env.step(action.data(), rng, observation.data());
       sum += step.reward / 10;
     }
@@ -342,10 +342,6 @@ TEST(Sac, RefusesWhatItCannotDo) {
               trainer.learner.update(trainer.parameters.data(), trainer.optimizer, trainer.rng);
             }),
             "call collect() before soft actor-critic's update().");
-  EXPECT_NE(test::errorOf([&] {
-              trainer.learner.contextPosterior(trainer.parameters.data());
-            }).find("no context encoder"),
-            std::string::npos);
 }
 
 TEST(Sac, SettingsAreBoundBelowTheirPrefix) {

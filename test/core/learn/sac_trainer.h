@@ -96,6 +96,18 @@ class Descent : public Optimizer<float> {
   float rate_;
 };
 
+// tanh(mean) of the actor
+inline std::vector<double> greedyAction(const SacNetworks& networks, const float* parameters,
+                                        const std::vector<float>& observation,
+                                        const std::vector<float>& task_input) {
+  GaussianActor actor(networks.actor(), task_input, 1, GaussianActor::By::kMean, parameters);
+  Rng none(0, 0, Stream::kEvaluate);
+  std::vector<double> action(networks.actionSize());
+  actor.look(observation.data(), {0});
+  EXPECT_TRUE(actor.act(0, none, action.data()));
+  return action;
+}
+
 inline std::vector<float> taskInput(const SacSettings& settings) {
   return settings.task_encoding == "one_hot" ? oneHot(1, 3) : std::vector<float>();
 }

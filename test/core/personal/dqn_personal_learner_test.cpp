@@ -1,4 +1,4 @@
-#include "pmeta_core/personal/dqn_personal_learner.h"
+#include "pmeta_core/learn/dqn.h"
 
 #include <gtest/gtest.h>
 
@@ -9,6 +9,7 @@
 #include "../allocations.h"
 #include "../memory_state.h"
 #include "pmeta_core/env/cart_pole.h"
+#include "pmeta_core/personal/personal_learner.h"
 
 namespace pmeta {
 namespace {
@@ -26,8 +27,8 @@ DqnSettings smallSettings() {
   return settings;
 }
 
-ProximalAdamSettings pulled() {
-  ProximalAdamSettings settings;
+PersonalSettings pulled() {
+  PersonalSettings settings;
   settings.learning_rate = 3e-3;
   settings.alpha = 1e-3;
   settings.lambda = 20;
@@ -35,12 +36,21 @@ ProximalAdamSettings pulled() {
   return settings;
 }
 
-DqnPersonalLearner makeLearner(const DqnSettings& settings = smallSettings(),
-                               const ProximalAdamSettings& optimizer = pulled()) {
-  return DqnPersonalLearner(makePole, settings, optimizer, 1000);
+PersonalLearner makeLearner(const DqnSettings& settings = smallSettings(),
+                            const PersonalSettings& personal = pulled(),
+                            std::int64_t total_updates = 1000) {
+  const auto poles = [](int n) { return makeEnvs([](int) { return makePole(); }, n); };
+  PersonalParts parts;
+  parts.learner = std::make_unique<DqnLearner>(poles(settings.num_envs), settings, total_updates);
+  parts.evaluation_envs = poles(settings.evaluation_episodes);
+  return PersonalLearner(std::move(parts), personal);
 }
 
-void run(DqnPersonalLearner& learner, int updates, Rng& rng) {
+const DqnLearner& dqn(const PersonalLearner& learner) {
+  return dynamic_cast<const DqnLearner&>(learner.learner());
+}
+
+void run(PersonalLearner& learner, int updates, Rng& rng) {
   for (int r = 0; r < updates; ++r) learner.update(rng);
 }
 
@@ -61,7 +71,7 @@ TEST(DqnPersonalLearner, BeginsAtANetworkOfTheSeed) {
 
 // the equations in double precision, around a learner of their own
 struct Reference : Optimizer<float> {
-  Reference(const Model& meta, const ProximalAdamSettings& s) : settings(s) {
+  Reference(const Model& meta, const PersonalSettings& s) : settings(s) {
     phi.assign(meta.floats().begin(), meta.floats().end());
     omega = phi;
     rounded = meta.floats();
@@ -87,7 +97,7 @@ struct Reference : Optimizer<float> {
       rounded[j] = static_cast<float>(phi[j]);
     }
   }
-  ProximalAdamSettings settings;
+  PersonalSettings settings;
   std::vector<double> phi, omega, m, v;
   std::vector<float> rounded;
   int t = 0;
@@ -122,7 +132,7 @@ TEST(DqnPersonalLearner, RoundsFollowTheEquations) {
         }
       }
     }
-    EXPECT_EQ(learner.learner().updates(), 30);
+    EXPECT_EQ(dqn(learner).updates(), 30);
   }
 }
 
@@ -131,14 +141,14 @@ TEST(DqnPersonalLearner, RoundResetsParametersAndNothingElse) {
   const Model meta = learner.initialModel(2);
   Rng rng(1, 0, Stream::kSample);
   learner.beginRound(learner.initialModel(1), false);
-  EXPECT_TRUE(std::equal(learner.learner().targets().begin(), learner.learner().targets().end(),
+  EXPECT_TRUE(std::equal(dqn(learner).targets().begin(), dqn(learner).targets().end(),
                          learner.personal().floats().begin()))
       << "the first target is the first meta-policy";
   run(learner, 10, rng);
-  const AlignedFloats first = learner.optimizer().firstMoment();
-  const AlignedFloats second = learner.optimizer().secondMoment();
-  const AlignedFloats targets = learner.learner().targets();
-  const std::vector<float> replay = learner.learner().replay().buffer().values();
+  const AlignedFloats first = learner.adam().firstMoment();
+  const AlignedFloats second = learner.adam().secondMoment();
+  const AlignedFloats targets = dqn(learner).targets();
+  const std::vector<float> replay = dqn(learner).replay().buffer().values();
   const std::vector<float> kept = learner.personal().floats();
   EXPECT_NE(kept, meta.floats());
 
@@ -148,16 +158,16 @@ TEST(DqnPersonalLearner, RoundResetsParametersAndNothingElse) {
   learner.beginRound(meta, false);
   EXPECT_EQ(learner.personal().floats(), meta.floats());
   EXPECT_EQ(learner.auxiliary().floats(), meta.floats());
-  EXPECT_EQ(test::stateOf(learner.optimizer()).get<std::int64_t>("updates").at(0), 10);
-  EXPECT_EQ(learner.optimizer().firstMoment(), first);
-  EXPECT_EQ(learner.optimizer().secondMoment(), second);
-  EXPECT_EQ(learner.learner().targets(), targets);
-  EXPECT_EQ(learner.learner().replay().buffer().values(), replay);
-  EXPECT_EQ(learner.learner().updates(), 10);
+  EXPECT_EQ(test::stateOf(learner.adam()).get<std::int64_t>("updates").at(0), 10);
+  EXPECT_EQ(learner.adam().firstMoment(), first);
+  EXPECT_EQ(learner.adam().secondMoment(), second);
+  EXPECT_EQ(dqn(learner).targets(), targets);
+  EXPECT_EQ(dqn(learner).replay().buffer().values(), replay);
+  EXPECT_EQ(dqn(learner).updates(), 10);
 }
 
 TEST(DqnPersonalLearner, AuxiliaryStaysTheMetaPolicyWithoutPull) {
-  ProximalAdamSettings optimizer = pulled();
+  PersonalSettings optimizer = pulled();
   optimizer.lambda = 0;
   auto learner = makeLearner(smallSettings(), optimizer);
   const Model meta = learner.initialModel(1);
@@ -172,7 +182,7 @@ TEST(DqnPersonalLearner, OneSeedOneResultWhateverIsEvaluated) {
   auto a = makeLearner(), b = makeLearner(), other = makeLearner();
   const Model meta = a.initialModel(1);
   for (int round = 1; round <= 3; ++round) {
-    for (DqnPersonalLearner* learner : {&a, &b, &other}) {
+    for (PersonalLearner* learner : {&a, &b, &other}) {
       learner->beginRound(meta, false);
       Rng rng(learner == &other ? 8 : 7, 0, Stream::kSample, round);
       run(*learner, 20, rng);
@@ -211,7 +221,7 @@ TEST(DqnPersonalLearner, RecordsAGreedyEpisode) {
   ASSERT_EQ(e.observation_size, 4);
   ASSERT_EQ(e.observations.size(), 4 * (e.rewards.size() + 1));
   EXPECT_NE(e.terminated, e.truncated);
-  const Mlp& network = learner.learner().network();
+  const Mlp& network = dqn(learner).network();
   MlpWorkspace workspace(network, 1);
   for (std::size_t t = 0; t < e.actions.size(); ++t) {
     const std::vector<float> observation(
@@ -236,7 +246,7 @@ TEST(DqnPersonalLearner, UpdatesAllocateNothing) {
     const std::size_t before = test::allocations();
     run(learner, 300, rng);  // fills the replay and turns it over
     EXPECT_EQ(test::allocations() - before, 0u);
-    EXPECT_EQ(learner.learner().replay().size(), 500u);
+    EXPECT_EQ(dqn(learner).replay().size(), 500u);
   }
 }
 
@@ -256,9 +266,9 @@ TEST_P(DqnSolves, CartPole) {
   settings.huber = GetParam().huber;
   settings.averaged_targets = GetParam().averaged_targets;
   settings.target_update_interval = 200;
-  ProximalAdamSettings optimizer;
-  optimizer.learning_rate = 3e-3;
-  DqnPersonalLearner learner(makePole, settings, optimizer, 4000);
+  PersonalSettings plain = pulled();
+  plain.lambda = 0;
+  PersonalLearner learner = makeLearner(settings, plain, 4000);
   learner.beginRound(learner.initialModel(0), false);
   Rng rng(0, 0, Stream::kSample), evaluation(0, 0, Stream::kEvaluate);
   EXPECT_LT(learner.evaluate(learner.personal(), evaluation).mean, 60);

@@ -1,4 +1,4 @@
-#include "pmeta_core/personal/sac_personal_learner.h"
+#include "pmeta_core/learn/sac.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,9 @@
 #include "../allocations.h"
 #include "../memory_state.h"
 #include "../support.h"
+#include "pmeta_core/adapt/latent_adaptation.h"
 #include "pmeta_core/aggregate/mix.h"
+#include "pmeta_core/personal/personal_learner.h"
 
 namespace pmeta {
 namespace {
@@ -67,19 +69,47 @@ SacSettings smallSettings(const std::string& task_encoding = "one_hot") {
   return settings;
 }
 
-ProximalAdamSettings pulled() {
-  ProximalAdamSettings settings;
+PersonalSettings pulled() {
+  PersonalSettings settings;
+  settings.learning_rate = settings.alpha = 1e-3;
   settings.lambda = 15;
   settings.eta = 1e-2;
   return settings;
 }
 
-SacPersonalLearner makeLearner(const SacSettings& settings = smallSettings(), int task = 1) {
-  return SacPersonalLearner([task] { return std::make_unique<Goal>(task - 1); }, settings, pulled(),
-                            task, kTasks);
+ProximalAdamSettings adamOf(const PersonalSettings& personal) {
+  ProximalAdamSettings settings;
+  settings.learning_rate = personal.learning_rate;
+  settings.alpha = personal.alpha;
+  settings.lambda = personal.lambda;
+  settings.eta = personal.eta;
+  return settings;
 }
 
-void run(SacPersonalLearner& learner, int updates, Rng& rng) {
+PersonalLearner makeLearner(const SacSettings& settings = smallSettings(), int task = 1,
+                            const PersonalSettings& personal = pulled()) {
+  const auto make_env = [task](int) { return std::make_unique<Goal>(task - 1); };
+  auto learner = std::make_unique<SacLearner>(
+      make_env(0), settings,
+      settings.task_encoding == "one_hot" ? oneHot(task, kTasks) : std::vector<float>());
+  PersonalParts parts;
+  if (learner->networks().hasEncoder()) {
+    parts.exploration_episodes = settings.context.exploration_episodes;
+    parts.adapt = [&networks = learner->networks(), context = settings.context](const Model& m) {
+      return std::make_unique<LatentAdaptation>(networks, context, m.floats().data());
+    };
+  }
+  parts.learner = std::move(learner);
+  parts.evaluation_envs = makeEnvs(make_env, settings.evaluation_episodes);
+  parts.reset_moments = settings.reset_moments;
+  return PersonalLearner(std::move(parts), personal);
+}
+
+const SacLearner& sac(const PersonalLearner& learner) {
+  return dynamic_cast<const SacLearner&>(learner.learner());
+}
+
+void run(PersonalLearner& learner, int updates, Rng& rng) {
   for (int r = 0; r < updates; ++r) learner.update(rng);
 }
 
@@ -104,7 +134,7 @@ struct Parts {
       : learner(std::make_unique<Goal>(0), settings, std::move(task_input)),
         phi(meta.floats()),
         omega(phi),
-        adam(phi.data(), omega.data(), phi.size(), pulled()) {
+        adam(phi.data(), omega.data(), phi.size(), adamOf(pulled())) {
     learner.resetTargets(phi.data());
   }
 
@@ -150,7 +180,7 @@ TEST(SacPersonalLearner, TheMetaPolicyExploresForContext) {
       learner.update(rng);
       parts.update(explorer == "meta" ? meta.floats() : parts.phi, same);
     }
-    EXPECT_EQ(learner.learner().replay().values(), parts.learner.replay().values()) << explorer;
+    EXPECT_EQ(sac(learner).replay().values(), parts.learner.replay().values()) << explorer;
     EXPECT_EQ(learner.personal().floats(), parts.phi) << explorer;
   }
 }
@@ -159,17 +189,17 @@ TEST(SacPersonalLearner, RoundResetsParametersAndNothingElse) {
   auto learner = makeLearner(smallSettings("inference"));
   Rng rng(1, 0, Stream::kSample);
   learner.beginRound(learner.initialModel(1), false);
-  const SacNetworks& networks = learner.learner().networks();
+  const SacNetworks& networks = sac(learner).networks();
   EXPECT_TRUE(std::equal(
-      learner.learner().targets().begin(), learner.learner().targets().end(),
+      sac(learner).targets().begin(), sac(learner).targets().end(),
       learner.personal().floats().begin() + static_cast<std::ptrdiff_t>(networks.criticOffset(0))))
       << "the first targets are the first meta-policy's critics";
   run(learner, 20, rng);
-  const AlignedFloats targets = learner.learner().targets();
-  const AlignedFloats first = learner.optimizer().firstMoment();
-  const double temperature = learner.learner().temperature().value();
-  const std::vector<float> replay = learner.learner().replay().values();
-  const std::vector<float> context = learner.learner().context().values();
+  const AlignedFloats targets = sac(learner).targets();
+  const AlignedFloats first = learner.adam().firstMoment();
+  const double temperature = sac(learner).temperature().value();
+  const std::vector<float> replay = sac(learner).replay().values();
+  const std::vector<float> context = sac(learner).context().kept().values();
   const std::vector<float> kept = learner.personal().floats();
 
   const Model meta = learner.initialModel(2);
@@ -178,12 +208,12 @@ TEST(SacPersonalLearner, RoundResetsParametersAndNothingElse) {
   EXPECT_EQ(learner.auxiliary().floats(), meta.floats());
   learner.beginRound(meta, false);
   EXPECT_EQ(learner.personal().floats(), meta.floats());
-  EXPECT_EQ(learner.learner().targets(), targets);
-  EXPECT_EQ(learner.optimizer().firstMoment(), first);
-  EXPECT_EQ(test::stateOf(learner.optimizer()).get<std::int64_t>("updates").at(0), 20);
-  EXPECT_EQ(learner.learner().temperature().value(), temperature);
-  EXPECT_EQ(learner.learner().replay().values(), replay);
-  EXPECT_EQ(learner.learner().context().values(), context);
+  EXPECT_EQ(sac(learner).targets(), targets);
+  EXPECT_EQ(learner.adam().firstMoment(), first);
+  EXPECT_EQ(test::stateOf(learner.adam()).get<std::int64_t>("updates").at(0), 20);
+  EXPECT_EQ(sac(learner).temperature().value(), temperature);
+  EXPECT_EQ(sac(learner).replay().values(), replay);
+  EXPECT_EQ(sac(learner).context().kept().values(), context);
 }
 
 TEST(SacPersonalLearner, TargetsAndMomentsBeginAnewWhereSettingsSaySo) {
@@ -196,12 +226,12 @@ TEST(SacPersonalLearner, TargetsAndMomentsBeginAnewWhereSettingsSaySo) {
   run(learner, 20, rng);
   const Model meta = learner.initialModel(2);
   learner.beginRound(meta, true);
-  const std::size_t offset = learner.learner().networks().criticOffset(0);
-  for (std::size_t k = 0; k < learner.learner().targets().size(); ++k) {
-    ASSERT_EQ(learner.learner().targets()[k], meta.floats()[offset + k]);
+  const std::size_t offset = sac(learner).networks().criticOffset(0);
+  for (std::size_t k = 0; k < sac(learner).targets().size(); ++k) {
+    ASSERT_EQ(sac(learner).targets()[k], meta.floats()[offset + k]);
   }
-  EXPECT_EQ(test::stateOf(learner.optimizer()).get<std::int64_t>("updates").at(0), 0);
-  EXPECT_EQ(learner.optimizer().firstMoment(), AlignedFloats(meta.size()));
+  EXPECT_EQ(test::stateOf(learner.adam()).get<std::int64_t>("updates").at(0), 0);
+  EXPECT_EQ(learner.adam().firstMoment(), AlignedFloats(meta.size()));
 }
 
 TEST(SacPersonalLearner, OwnColumnIsAggregatedFromItsTaskAlone) {
@@ -262,7 +292,7 @@ TEST(SacPersonalLearner, OneSeedOneResultWhateverIsEvaluated) {
          other = makeLearner(smallSettings(encoding));
     const Model meta = a.initialModel(1);
     for (int round = 1; round <= 3; ++round) {
-      for (SacPersonalLearner* learner : {&a, &b, &other}) {
+      for (PersonalLearner* learner : {&a, &b, &other}) {
         learner->beginRound(meta, false);
         Rng rng(learner == &other ? 8 : 7, 0, Stream::kSample, round);
         run(*learner, 20, rng);
@@ -270,7 +300,7 @@ TEST(SacPersonalLearner, OneSeedOneResultWhateverIsEvaluated) {
         Rng evaluation(7, 0, Stream::kEvaluate);
         learner->evaluate(learner->personal(), evaluation);
         learner->record(meta, evaluation);
-        if (learner->learner().networks().hasEncoder()) learner->evaluateAdapted(meta, evaluation);
+        if (sac(*learner).networks().hasEncoder()) learner->evaluateAdapted(meta, evaluation);
       }
     }
     EXPECT_EQ(a.personal().checksum(), b.personal().checksum());
@@ -287,15 +317,18 @@ TEST(SacPersonalLearner, EvaluatesWithTheMeanOfItsOwnContext) {
   Rng starts(2, 0, Stream::kEvaluate);
   const Episode episode = learner.record(learner.personal(), starts);
   const float* parameters = learner.personal().floats().data();
-  const LatentPosterior posterior = learner.learner().contextPosterior(parameters);
+  const SacNetworks& networks = sac(learner).networks();
+  const LatentPosterior posterior =
+      sac(learner).context().posterior(parameters + networks.encoderOffset());
   const std::vector<float> z(posterior.mean.begin(), posterior.mean.end());
-  const SacNetworks& networks = learner.learner().networks();
-  SacNetworks::ActorWorkspace workspace(networks, 1);
+  EXPECT_EQ(learner.taskInput(learner.personal()), z);
+  GaussianActor actor(networks.actor(), z, 1, GaussianActor::By::kMean, parameters);
   ASSERT_EQ(episode.actions.size(), 10u);
   for (std::size_t t = 0; t < episode.actions.size(); ++t) {
     const std::vector<float> seen(&episode.observations[2 * t], &episode.observations[2 * t] + 2);
     double action = 0;
-    networks.greedyActions(parameters, seen.data(), 1, z.data(), workspace, &action);
+    actor.look(seen.data(), {0});
+    actor.act(0, rng, &action);
     EXPECT_EQ(episode.actions[t], action);
   }
 }
@@ -313,12 +346,35 @@ TEST(SacPersonalLearner, AdaptedReturnsCompareLikeWithLike) {
   // nothing was collected, so evaluate() has the prior's mean for z
   EXPECT_EQ(learner.evaluate(policy, same).mean, returns[0].stats.mean);
   // an actor blind to z gains nothing: the starts are the same
-  const Mlp& actor = learner.learner().networks().actor();
+  const Mlp& actor = sac(learner).networks().actor();
   for (std::size_t o = 0; o < 8; ++o) {
     for (std::size_t i = 2; i < 4; ++i) policy.floats()[o * actor.inputs() + i] = 0;
   }
   const std::vector<AdaptedReturn> blind = learner.evaluateAdapted(policy, rng);
   EXPECT_EQ(blind[0].stats.mean, blind[1].stats.mean);
+}
+
+TEST(SacPersonalLearner, MetaPoliciesAreJudgedAfterEachNumberOfEpisodesAskedFor) {
+  SacSettings settings = smallSettings("inference");
+  settings.context.exploration_episodes = {1, 3};
+  const auto learner = makeLearner(settings);
+  Rng rng(3, 0, Stream::kEvaluate), same = rng;
+  const Model policy = learner.initialModel(1);
+  const std::vector<AdaptedReturn> returns = learner.evaluateAdapted(policy, rng);
+  ASSERT_EQ(returns.size(), 3u);
+  EXPECT_EQ(returns[0].context_episodes, 0);
+  EXPECT_EQ(returns[1].context_episodes, 1);
+  EXPECT_EQ(returns[2].context_episodes, 3);
+  EXPECT_EQ(returns[0].task_input, std::vector<float>(2));
+  EXPECT_NE(returns[1].task_input, returns[2].task_input);
+  const Episode episode = learner.recordAdapted(policy, returns[2], same);
+  const std::unique_ptr<Actor> actor =
+      learner.learner().policies().actor(policy, returns[2].task_input, 1);
+  const std::vector<float> start(episode.observations.begin(), episode.observations.begin() + 2);
+  double action = 0;
+  actor->look(start.data(), {0});
+  actor->act(0, same, &action);
+  EXPECT_EQ(episode.actions[0], action);
 }
 
 TEST(SacPersonalLearner, WithoutAnEncoderThereIsNothingToAdapt) {
@@ -332,18 +388,15 @@ TEST(SacPersonalLearner, WithoutAnEncoderThereIsNothingToAdapt) {
 
 TEST(SacPersonalLearner, NetworksWithLambdaZeroAreEachRobotsOwn) {
   const SacSettings settings = smallSettings();
-  ProximalAdamSettings adam;
-  adam.lambda = 10;
-  SacLambdas lambdas;
-  lambdas.critic = 0;
-  SacPersonalLearner learner([] { return std::make_unique<Goal>(0.5); }, settings, adam, 0, 3,
-                             lambdas);
+  PersonalSettings personal = pulled();
+  personal.lambdas.critic = 0;
+  PersonalLearner learner = makeLearner(settings, 0, personal);
   Rng rng(1, 0, Stream::kSample);
   const Model meta = learner.initialModel(1);
   learner.beginRound(meta, false);
   run(learner, 20, rng);
   const std::vector<float> trained = learner.personal().floats();
-  const std::size_t critics = learner.learner().networks().criticOffset(0);
+  const std::size_t critics = sac(learner).networks().criticOffset(0);
   EXPECT_TRUE(std::equal(meta.floats().begin() + critics, meta.floats().end(),
                          learner.auxiliary().floats().begin() + critics));
   EXPECT_FALSE(std::equal(meta.floats().begin(), meta.floats().begin() + critics,
@@ -378,12 +431,11 @@ TEST(SacPersonalLearner, RoundsGiveOneMetaPolicyForAllGoals) {
   settings.batch_size = 32;
   settings.warm_up_steps = 200;
   settings.gamma = 0.9;
-  std::vector<std::unique_ptr<SacPersonalLearner>> learners;
+  std::vector<std::unique_ptr<PersonalLearner>> learners;
   for (int task = 0; task < kTasks; ++task) {
-    ProximalAdamSettings adam = pulled();
-    adam.learning_rate = 3e-3;
-    learners.push_back(std::make_unique<SacPersonalLearner>(
-        [task] { return std::make_unique<Goal>(task - 1); }, settings, adam, task, kTasks));
+    PersonalSettings personal = pulled();
+    personal.learning_rate = 3e-3;
+    learners.push_back(std::make_unique<PersonalLearner>(makeLearner(settings, task, personal)));
   }
   Model meta = learners[0]->initialModel(0);
   const auto meanReturn = [&](bool personal) {

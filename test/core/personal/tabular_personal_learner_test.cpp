@@ -1,4 +1,4 @@
-#include "pmeta_core/personal/tabular_personal_learner.h"
+#include "pmeta_core/learn/tabular_learner.h"
 
 #include <gtest/gtest.h>
 
@@ -7,16 +7,21 @@
 
 #include "../support.h"
 #include "pmeta_core/env/gridworld.h"
+#include "pmeta_core/personal/personal_learner.h"
 
 namespace pmeta {
 namespace {
 
 constexpr int kStride = 5;
 
-TabularPersonalLearner makeLearner(const PersonalSettings& personal,
-                                   const QLearningSettings& q_learning = {},
-                                   const GridworldTask& task = {4, 2, 3, 0}) {
-  return {std::make_unique<Gridworld>(task, kStride), q_learning, personal};
+PersonalLearner makeLearner(const PersonalSettings& personal,
+                            const QLearningSettings& q_learning = {},
+                            const GridworldTask& task = {4, 2, 3, 0}) {
+  PersonalParts parts;
+  parts.learner =
+      std::make_unique<TabularLearner>(std::make_unique<Gridworld>(task, kStride), q_learning);
+  parts.evaluation_envs.push_back(std::make_unique<Gridworld>(task, kStride));
+  return PersonalLearner(std::move(parts), personal);
 }
 
 Model numbered(const ModelLayout& layout) {

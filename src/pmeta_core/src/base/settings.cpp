@@ -173,6 +173,20 @@ void Settings::bind(const std::string& key, double& value, const std::string& do
        [&value] { return formatNumber(value); }});
 }
 
+void Settings::bind(const std::string& key, std::optional<double>& value, const std::string& doc,
+                    Range range) {
+  const std::string allowed = "a number" + rangeSuffix(range) + ", or -1";
+  add({key, doc, allowed, "",
+       [=, &value](const YAML::Node& node, const std::string& where) {
+         double number = 0;
+         if (!parseNumber(node, number) || (!range.contains(number) && number != -1)) {
+           refuse(key, node, where, allowed);
+         }
+         value = number == -1 ? std::nullopt : std::optional<double>(number);
+       },
+       [&value] { return formatNumber(value.value_or(-1)); }});
+}
+
 void Settings::bind(const std::string& key, std::int64_t& value, const std::string& doc,
                     Range range) {
   const std::string allowed = "a whole number" + rangeSuffix(range);

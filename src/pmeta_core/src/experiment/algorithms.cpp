@@ -43,13 +43,14 @@ Algorithm pooled() {
   row.meaning = "each robot for itself, in environments of all tasks";
   row.shares = false;
   row.pools_environments = true;
-  row.check = [](const ExperimentSettings& settings, int num_tasks) {
-    if (settings.learner != "dqn") {
-      throw Error("algorithm pooled needs learner dqn, which trains in several environments.");
+  row.check = [](const ExperimentSettings& settings, const LearnerKind& learner, int num_tasks) {
+    if (learner.trainingEnvs() == 0) {
+      throw Error("algorithm pooled needs a learner that trains in several environments; " +
+                  settings.learner + " does not.");
     }
-    if (settings.dqn.num_envs < num_tasks) {
-      throw Error("algorithm pooled needs at least one environment a task: set dqn.num_envs to " +
-                  std::to_string(num_tasks) + " or more.");
+    if (learner.trainingEnvs() < num_tasks) {
+      throw Error("algorithm pooled needs at least one environment a task: set " +
+                  settings.learner + ".num_envs to " + std::to_string(num_tasks) + " or more.");
     }
   };
   return row;

@@ -3,8 +3,18 @@
 #include "pmeta_core/experiment/experiment.h"
 
 namespace pmeta {
+namespace {
 
-void Experiment::bind(Settings& s, const std::string& learner) {
+// "NAME what it is for, ..."
+std::string meanings(const Registry<LearnerRow>& rows) {
+  std::vector<std::string> all;
+  for (const std::string& name : rows.names()) all.push_back(name + " " + rows.at(name).meaning);
+  return join(all);
+}
+
+}  // namespace
+
+void Experiment::bind(Settings& s) {
   ExperimentSettings& e = settings_;
   s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
   s.bind("preset", e.preset, "variant of the settings file; \"\" for none");
@@ -12,10 +22,8 @@ void Experiment::bind(Settings& s, const std::string& learner) {
          "shared library whose environments, learners, algorithms, rules and scenes are added to "
          "those of the suite; \"\" for none");
   s.bind("algorithm", e.algorithm, "what is trained", algorithms().names());
-  s.bind("learner", e.learner,
-         "q_learning for tables, dqn for networks, sac for networks with continuous actions",
-         {"dqn", "q_learning", "sac"});
-  if (e.learner != "q_learning") {
+  s.bind("learner", e.learner, meanings(learners()), learners().names());
+  if (learner_->hasNetworks()) {
     s.bind(
         "arithmetic", e.arithmetic,
         "matrix products of networks: native, with the instructions of this processor; portable, "
@@ -54,7 +62,7 @@ void Experiment::bind(Settings& s, const std::string& learner) {
   s.bind("personal.personal_init", e.personal.personal_init,
          "personal parameters at a round's start: the meta-policy's, or kept", {"meta", "keep"});
 
-  bindLearner(s, learner);
+  learner_->bind(s, e.personal);
 
   s.bind("aggregation.beta", e.aggregation.beta, "mixing: meta <- (1 - beta) meta + beta mean",
          Range::between(0, 1));

@@ -19,14 +19,14 @@ std::string roundedDown(double value) {
 
 void Experiment::applyAlgorithm() {
   ExperimentSettings& e = settings_;
-  if (algorithm_->check) algorithm_->check(e, numTasks());
+  if (algorithm_->check) algorithm_->check(e, *learner_, numTasks());
   if (algorithm_->pulls) return;
   const std::string init = evaluatesMeta() ? "meta" : "keep";
   std::vector<std::string> changes;
   if (e.personal.lambda != 0) changes.push_back("personal.lambda to 0");
   if (e.personal.personal_init != init) changes.push_back("personal.personal_init to " + init);
   e.personal.lambda = 0;
-  e.personal.lambda_actor = e.personal.lambda_critic = e.personal.lambda_encoder = -1;
+  e.personal.lambdas = {};
   e.personal.personal_init = init;
   if (!evaluatesMeta()) {
     if (e.aggregation.beta != 0) changes.push_back("aggregation.beta to 0");
@@ -51,16 +51,11 @@ void Experiment::checkAggregation() const {
 
 void Experiment::checkStability() {
   const PersonalSettings& p = settings_.personal;
-  for (const double lambda : {p.lambda_actor, p.lambda_critic, p.lambda_encoder}) {
-    if (lambda < 0 && lambda != -1) {
-      throw Error("a lambda of a network's own is " + formatNumber(lambda) +
-                  " but must be at least 0, or -1 for that of all.");
-    }
-  }
-  const bool tabular = settings_.learner == "q_learning";
+  const std::optional<double> gamma = learner_->linearDiscount();
+  const bool tabular = gamma.has_value();
   // with frozen auxiliary parameters the update is a linear map that blows up beyond these; of a
   // network only the pull is linear
-  const double own = tabular ? 1 + settings_.q_learning.gamma : 0;
+  const double own = tabular ? 1 + *gamma : 0;
   const std::string formula = tabular ? "2 / (1 + lambda + gamma)" : "2 / lambda";
   if (p.alpha * (own + p.lambda) >= 2) {
     throw Error("personal.alpha = " + formatNumber(p.alpha) + " with personal.lambda = " +

@@ -64,7 +64,8 @@ std::string Experiment::describe() const {
   Experiment defaults;
   defaults.family_ = envFamilies().at(settings_.environment)();
   Settings settings;
-  defaults.bind(settings, settings_.learner);
+  defaults.learner_ = learners().at(settings_.learner).make();
+  defaults.bind(settings);
   settings.read(parseYaml(yaml_, "the settings"), "the settings");
   return settings.table(true);
 }

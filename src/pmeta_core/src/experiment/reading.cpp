@@ -1,7 +1,5 @@
 // From settings files, presets and overrides to an Experiment.
-#include <algorithm>
 #include <filesystem>
-#include <functional>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
@@ -129,12 +127,13 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
       peek({}, overrides, "", "library", anchored(peek(files, {}, "", "library", ""), folder));
   if (!library.empty()) loadLibrary(absolutePath("library", library));
   Experiment experiment;
-  const std::string learner = peek(files, overrides, "", "learner", experiment.settings_.learner);
+  experiment.learner_ =
+      learners().at(peek(files, overrides, "", "learner", experiment.settings_.learner)).make();
   experiment.family_ = envFamilies().at(
       peek(files, overrides, "environment", "name", experiment.settings_.environment))();
 
   Settings settings;
-  experiment.bind(settings, learner);
+  experiment.bind(settings);
   for (const YAML::Node& file : files) settings.read(file, source);
   experiment.anchorPaths(folder);
   for (const std::string& assignment : overrides) settings.assign(assignment);
@@ -152,16 +151,12 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
                 " but there are " + std::to_string(experiment.numTasks()) +
                 " tasks: give at most that, or 0 for all.");
   }
-  const std::vector<int>& counts = e.sac.context.exploration_episodes;
-  if (std::adjacent_find(counts.begin(), counts.end(), std::greater_equal<int>()) != counts.end()) {
-    throw Error("sac.exploration_episodes must be ascending, e.g. [5, 15].");
-  }
   experiment.algorithm_ = &algorithms().at(e.algorithm);
   experiment.applyAlgorithm();
   experiment.checkAggregation();
   experiment.checkStability();
-  e.dqn.portable = e.sac.portable = e.sac.context.portable = e.arithmetic == "portable";
-  experiment.checkSampling();
+  experiment.learner_->setPortable(e.arithmetic == "portable");
+  experiment.learner_->check();
   e.results_dir = expandResultsDir(e.results_dir);
   if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
   if (!e.library.empty()) e.library = absolutePath("library", e.library);

@@ -73,6 +73,13 @@ double klToPrior(const LatentPosterior& posterior) {
   return sum;
 }
 
+void drawLatent(const LatentPosterior& posterior, Rng& rng, double* noise, float* z) {
+  for (std::size_t j = 0; j < posterior.mean.size(); ++j) {
+    noise[j] = rng.normal();
+    z[j] = static_cast<float>(posterior.mean[j] + std::sqrt(posterior.variance[j]) * noise[j]);
+  }
+}
+
 ContextEncoder::Workspace::Workspace(const ContextEncoder& encoder, std::size_t max_rows)
     : mlp(encoder.network(), max_rows),
       heads(max_rows * encoder.network().outputs()),

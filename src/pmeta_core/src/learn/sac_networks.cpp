@@ -1,10 +1,10 @@
 #include "pmeta_core/learn/sac_networks.h"
 
-#include <algorithm>
 #include <string>
+#include <utility>
 
+#include "pmeta_core/act/gaussian_actor.h"
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/learn/gaussian_policy.h"
 
 namespace pmeta {
 namespace {
@@ -48,9 +48,6 @@ std::vector<float> oneHot(int task, int num_tasks) {
   return vector;
 }
 
-SacNetworks::ActorWorkspace::ActorWorkspace(const SacNetworks& networks, std::size_t max_batch)
-    : mlp(networks.actor(), max_batch), input(max_batch * networks.actor().inputs()) {}
-
 SacNetworks::SacNetworks(const EnvSpec& env, const SacSettings& settings, int num_tasks)
     : observation_size_(static_cast<std::size_t>(requireContinuous(env).observation_size)),
       action_size_(static_cast<std::size_t>(env.action_size)),
@@ -86,22 +83,19 @@ void SacNetworks::initialise(float* parameters, Rng& rng) const {
   if (hasEncoder()) encoder_->network().initialise(parameters + encoderOffset(), rng);
 }
 
-const float* SacNetworks::heads(const float* parameters, const float* observations,
-                                std::size_t batch, const float* task_input,
-                                ActorWorkspace& workspace) const {
-  float* row = workspace.input.data();
-  for (std::size_t b = 0; b < std::min(batch, workspace.mlp.maxBatch()); ++b) {
-    row = std::copy_n(observations + b * observation_size_, observation_size_, row);
-    row = std::copy_n(task_input, task_input_size_, row);
-  }
-  return actor_.forward(parameters, workspace.input.data(), batch, workspace.mlp);
+SacPolicies::SacPolicies(const EnvSpec& env, const SacSettings& settings, int num_tasks)
+    : PolicyFamily(
+          ModelLayout(Precision::kFloat32, SacNetworks(env, settings, num_tasks).blocks())),
+      networks_(env, settings, num_tasks) {}
+
+void SacPolicies::initialise(Model& parameters, Rng& rng) const {
+  networks_.initialise(parameters.floats().data(), rng);
 }
 
-void SacNetworks::greedyActions(const float* parameters, const float* observations,
-                                std::size_t batch, const float* task_input,
-                                ActorWorkspace& workspace, double* actions) const {
-  meanActions(heads(parameters, observations, batch, task_input, workspace), batch, action_size_,
-              actions);
+std::unique_ptr<Actor> SacPolicies::actor(const Model& parameters, std::vector<float> task_input,
+                                          std::size_t max_batch) const {
+  return std::make_unique<GaussianActor>(networks_.actor(), std::move(task_input), max_batch,
+                                         GaussianActor::By::kMean, parameters.floats().data());
 }
 
 }  // namespace pmeta

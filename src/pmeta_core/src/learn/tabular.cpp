@@ -31,11 +31,6 @@ ReturnStats overStarts(const TabularEnv& env, const std::vector<double>& values)
 
 }  // namespace
 
-int greedyAction(const double* action_values, int num_actions) {
-  return static_cast<int>(std::max_element(action_values, action_values + num_actions) -
-                          action_values);
-}
-
 double bellmanBackup(const TabularEnv& env, const QTable& q, int state, int action, double gamma) {
   const int n = env.numActions();
   double sum = 0;

@@ -24,12 +24,12 @@ std::string divergence(const Model& model) {
   return std::visit([&](const auto& values) { return divergenceOf(model, values); }, model.values);
 }
 
-std::string stepSizes(const ExperimentSettings& settings) {
-  const PersonalSettings& p = settings.personal;
+std::string stepSizes(const Experiment& experiment) {
+  const PersonalSettings& p = experiment.settings().personal;
   const std::string pull = "personal.alpha (" + formatNumber(p.alpha) + "), personal.eta (" +
                            formatNumber(p.eta) + ") or personal.lambda (" + formatNumber(p.lambda) +
                            ")";
-  if (settings.learner == "q_learning") return "lower " + pull;
+  if (!experiment.learner().hasNetworks()) return "lower " + pull;
   return "lower personal.learning_rate (" + formatNumber(p.learning_rate) + "), " + pull;
 }
 

@@ -5,14 +5,10 @@
 #include <cmath>
 #include <filesystem>
 #include <locale>
-#include <optional>
 #include <sstream>
 #include <vector>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/learn/sac_networks.h"
-#include "pmeta_core/nn/aligned.h"
-#include "pmeta_core/nn/mlp.h"
 
 namespace pmeta {
 namespace {
@@ -62,65 +58,6 @@ Experiment experimentOf(const PolicyFile& file, const std::string& path) {
 
 }  // namespace
 
-/// Networks that act on an observation as floats.
-class LoadedPolicy::Network {
- public:
-  virtual ~Network() = default;
-  virtual std::vector<Block> blocks() const = 0;
-  virtual void act(const float* parameters, const float* observation, double* action) = 0;
-
-  bool actOn(const double* observation, double* action) {
-    for (std::size_t k = 0; k < observation_.size(); ++k) {
-      observation_[k] = static_cast<float>(observation[k]);
-      if (!std::isfinite(observation_[k])) return false;
-    }
-    act(parameters_.data(), observation_.data(), action);
-    return true;
-  }
-
-  void load(const std::vector<float>& values, std::size_t observation_size) {
-    parameters_.assign(values.begin(), values.end());
-    observation_.resize(observation_size);
-  }
-
- private:
-  AlignedFloats parameters_;
-  std::vector<float> observation_;
-};
-
-class LoadedPolicy::QNetwork : public Network {
- public:
-  explicit QNetwork(MlpSpec spec) : mlp_(std::move(spec)) {}
-  std::vector<Block> blocks() const override { return mlp_.blocks(); }
-  void act(const float* parameters, const float* observation, double* action) override {
-    // only now are its sizes known to be those of the file
-    if (!workspace_) workspace_.emplace(mlp_, 1);
-    const float* values = mlp_.forward(parameters, observation, 1, *workspace_);
-    action[0] = static_cast<double>(std::max_element(values, values + mlp_.outputs()) - values);
-  }
-
- private:
-  Mlp mlp_;
-  std::optional<MlpWorkspace> workspace_;
-};
-
-class LoadedPolicy::Actor : public Network {
- public:
-  Actor(const EnvSpec& spec, const SacSettings& settings, int num_tasks,
-        std::vector<float> task_input)
-      : networks_(spec, settings, num_tasks), task_input_(std::move(task_input)) {}
-  std::vector<Block> blocks() const override { return networks_.blocks(); }
-  void act(const float* parameters, const float* observation, double* action) override {
-    if (!workspace_) workspace_.emplace(networks_, 1);
-    networks_.greedyActions(parameters, observation, 1, task_input_.data(), *workspace_, action);
-  }
-
- private:
-  SacNetworks networks_;
-  std::vector<float> task_input_;
-  std::optional<SacNetworks::ActorWorkspace> workspace_;
-};
-
 LoadedPolicy::LoadedPolicy(const std::string& path, int as_task)
     : LoadedPolicy(path, loadPolicy(path), as_task) {}
 
@@ -135,71 +72,42 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file, int as_task
     throw Error("the policy file " + path + " is of neither a personal nor a meta policy.");
   }
   env_ = experiment_.family().make(std::max(task_, 0));
-
   // the layout that the settings give is known before anything of its size is allocated
-  std::vector<Block> blocks;
-  Precision precision = Precision::kFloat32;
-  table_ = experiment_.settings().learner == "q_learning"
-               ? dynamic_cast<const TabularEnv*>(env_.get())
-               : nullptr;
-  if (table_ != nullptr) {
-    precision = Precision::kFloat64;
-    blocks = {{"q_table",
-               {static_cast<std::size_t>(table_->numStates()),
-                static_cast<std::size_t>(table_->numActions())}}};
-  } else if (experiment_.settings().learner == "dqn" && spec().num_actions > 0) {
-    network_ = std::make_unique<QNetwork>(dqnNetwork(spec(), experiment_.settings().dqn));
-    blocks = network_->blocks();
-  } else if (experiment_.settings().learner == "sac" && spec().num_actions == 0) {
-    network_ = std::make_unique<Actor>(spec(), experiment_.settings().sac, experiment_.numTasks(),
-                                       taskInput(file, path, as_task));
-    blocks = network_->blocks();
-  } else {
-    throw Error("the policy file " + path + " is of learner '" + experiment_.settings().learner +
-                "' on '" + spec().name + "', which cannot act from a file.");
-  }
-  if (model_.layout != ModelLayout(precision, std::move(blocks))) {
+  policies_ = experiment_.learner().policies(*env_, experiment_.numTasks());
+  if (model_.layout != policies_->layout()) {
     throw Error("the policy file " + path + " has parameters that do not fit its own settings.");
   }
-  if (network_ != nullptr) {
-    network_->load(model_.floats(), static_cast<std::size_t>(spec().observation_size));
-  }
+  actor_ = policies_->actor(model_, taskInput(file, path, as_task), 1);
+  observation_.resize(static_cast<std::size_t>(spec().observation_size));
 }
 
 std::vector<float> LoadedPolicy::taskInput(const PolicyFile& file, const std::string& path,
                                            int as_task) const {
-  const SacSettings& sac = experiment_.settings().sac;
-  if (sac.task_encoding == "none") return {};
-  if (sac.task_encoding == "one_hot") {
-    const int task = policy_ == PolicyKind::kPersonal ? task_ : as_task;
-    if (task < 0 || task >= experiment_.numTasks()) {
-      throw Error("the policy file " + path +
-                  " is a meta-policy that must be told its task: choose one from 0 to " +
-                  std::to_string(experiment_.numTasks() - 1) + ".");
-    }
-    return oneHot(task, experiment_.numTasks());
+  if (policy_ == PolicyKind::kMeta) {
+    const auto input = experiment_.learner().metaInput(as_task, experiment_.numTasks());
+    if (input) return *input;
+    throw Error("the policy file " + path +
+                " is a meta-policy that must be told its task: choose one from 0 to " +
+                std::to_string(experiment_.numTasks() - 1) + ".");
   }
-  const auto size = static_cast<std::size_t>(sac.context.latent_size);
-  if (policy_ == PolicyKind::kMeta) return std::vector<float>(size, 0.0f);  // the prior's mean
+  const std::size_t size = policies_->taskInputSize();
+  if (size == 0) return {};
   std::istringstream text(textOf(file, path, "task_input"));
-  std::vector<float> latent;
+  std::vector<float> numbers;
   for (std::string word; std::getline(text, word, ',');) {
     std::istringstream number(word);
     number.imbue(std::locale::classic());
     float value = 0;
     number >> value;
     if (!number || !number.eof() || !std::isfinite(value)) break;
-    latent.push_back(value);
+    numbers.push_back(value);
   }
-  if (latent.size() != size) {
+  if (numbers.size() != size) {
     throw Error("the policy file " + path + " has a task_input that is not of " +
                 std::to_string(size) + " numbers.");
   }
-  return latent;
+  return numbers;
 }
-
-LoadedPolicy::~LoadedPolicy() = default;
-LoadedPolicy::LoadedPolicy(LoadedPolicy&&) noexcept = default;
 
 std::string LoadedPolicy::description() const {
   const std::string whose = task_ < 0
@@ -209,22 +117,12 @@ std::string LoadedPolicy::description() const {
 }
 
 bool LoadedPolicy::act(const double* observation, double* action) {
-  return table_ != nullptr ? actFromTable(observation, action)
-                           : network_->actOn(observation, action);
-}
-
-bool LoadedPolicy::actFromTable(const double* observation, double* action) const {
-  // what is far from any state, or not a number, must not reach stateOf()'s whole numbers
-  for (int k = 0; k < spec().observation_size; ++k) {
-    if (!(std::abs(observation[k]) < table_->numStates())) return false;
+  for (std::size_t k = 0; k < observation_.size(); ++k) {
+    observation_[k] = static_cast<float>(observation[k]);
+    if (!std::isfinite(observation_[k])) return false;
   }
-  const int state = table_->stateOf(observation);
-  if (state < 0 || state >= table_->numStates()) return false;
-  const int n = table_->numActions();
-  const std::size_t row = static_cast<std::size_t>(state) * static_cast<std::size_t>(n);
-  if (!model_.isPresent(row)) return false;
-  action[0] = greedyAction(&model_.doubles()[row], n);
-  return true;
+  actor_->look(observation_.data(), envs_);
+  return actor_->act(0, greedy_, action);
 }
 
 }  // namespace pmeta

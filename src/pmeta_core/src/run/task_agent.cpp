@@ -30,7 +30,7 @@ TaskAgent::TaskAgent(const Experiment& experiment, int task)
     : run_id_(experiment.settings().run_id),
       settings_hash_(experiment.settingsHash()),
       name_("task " + std::to_string(task) + " (" + experiment.family().taskName(task) + ")"),
-      step_sizes_(stepSizes(experiment.settings())),
+      step_sizes_(stepSizes(experiment)),
       simulation_settings_(simulationSettings(experiment.settings())),
       seed_(static_cast<std::uint64_t>(experiment.settings().seed)),
       task_(task),

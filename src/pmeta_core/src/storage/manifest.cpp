@@ -22,10 +22,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// by learner
-const std::map<std::string, const char*> kPolicies = {
-    {"q_learning", "table"}, {"dqn", "q_network"}, {"sac", "actor_critic"}};
-
 const std::vector<std::string> kPull = {"personal.lambda",        "personal.lambda_actor",
                                         "personal.lambda_critic", "personal.lambda_encoder",
                                         "personal.eta",           "personal.personal_init",
@@ -68,8 +64,7 @@ Json figures(const Experiment& experiment) {
   found["compared_by"] = name(averages ? PolicyKind::kMeta : PolicyKind::kPersonal);
   found["own_settings"] = algorithm.pulls ? kPull : std::vector<std::string>();
   found["fixed_settings"] = fixedSettings(experiment, algorithm);
-  const auto policies = kPolicies.find(experiment.settings().learner);
-  found["policies"] = policies == kPolicies.end() ? "other" : policies->second;
+  found["policies"] = learners().at(experiment.settings().learner).policies;
   found["curves"] = curves(experiment);
   return found;
 }
@@ -122,7 +117,7 @@ std::string manifestText(const std::string& run_dir, const char* key) {
 
 std::string otherMachine(const Experiment& experiment) {
   // tables have no matrix products; portable ones are the same everywhere
-  if (experiment.settings().learner == "q_learning") return "";
+  if (!experiment.learner().hasNetworks()) return "";
   const bool portable = experiment.settings().arithmetic == "portable";
   const std::string path = experiment.runDir() + "/manifest.json";
   if (!std::filesystem::exists(path)) return "";

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -43,6 +44,9 @@ enum class Empty { kRefused, kAllowed };
 class Settings {
  public:
   void bind(const std::string& key, double& value, const std::string& doc, Range range = {});
+  /// -1, which `range` leaves out, stands for no value.
+  void bind(const std::string& key, std::optional<double>& value, const std::string& doc,
+            Range range);
   void bind(const std::string& key, int& value, const std::string& doc, Range range = {});
   void bind(const std::string& key, std::int64_t& value, const std::string& doc, Range range = {});
   void bind(const std::string& key, bool& value, const std::string& doc);

@@ -5,6 +5,7 @@
 
 #include "pmeta_core/base/registry.h"
 #include "pmeta_core/experiment/experiment_settings.h"
+#include "pmeta_core/personal/learner_kind.h"
 
 namespace pmeta {
 
@@ -28,7 +29,8 @@ struct Algorithm {
   /// Does each agent train in environments of all tasks, as if trajectories were shared?
   bool pools_environments = false;
   /// Throws Error on settings that do not go with it; may be empty.
-  std::function<void(const ExperimentSettings& settings, int num_tasks)> check = {};
+  std::function<void(const ExperimentSettings& settings, const LearnerKind& learner, int num_tasks)>
+      check = {};
 };
 
 /// Every algorithm, by the name that `algorithm` gives.

@@ -49,6 +49,7 @@ class Experiment {
                            const std::string& of_config = "");
 
   const ExperimentSettings& settings() const { return settings_; }
+  const LearnerKind& learner() const { return *learner_; }
   const EnvFamily& family() const { return *family_; }
   int numTasks() const { return family_->numTasks(); }  ///< that are trained on
   int numTestTasks() const;  ///< that only the meta-policy is evaluated on, numbered after those
@@ -121,10 +122,7 @@ class Experiment {
                           const std::vector<std::string>& overrides, const std::string& folder);
   static std::map<std::string, std::string> definingSettings(const std::string& yaml);
   void anchorPaths(const std::string& folder);
-  std::unique_ptr<PersonalLearner> makeLearnerUnguarded(int task) const;
-  void checkSampling() const;
-  void bind(Settings& settings, const std::string& learner);
-  void bindLearner(Settings& settings, const std::string& learner);
+  void bind(Settings& settings);
   void applyAlgorithm();
   void checkAggregation() const;
   void checkStability();
@@ -132,6 +130,7 @@ class Experiment {
   ExperimentSettings settings_;
   const Algorithm* algorithm_ = nullptr;
   std::map<std::string, std::shared_ptr<AggregationRule>> rules_;  // with their settings
+  std::shared_ptr<LearnerKind> learner_;
   std::shared_ptr<EnvFamily> family_;
   std::shared_ptr<Optima> optima_ = std::make_shared<Optima>();
   std::string yaml_;

@@ -3,10 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "pmeta_core/learn/dqn.h"
-#include "pmeta_core/learn/sac_settings.h"
 #include "pmeta_core/personal/personal_settings.h"
-#include "pmeta_core/personal/tabular_personal_learner.h"
 
 namespace pmeta {
 
@@ -35,7 +32,7 @@ struct ExperimentSettings {
   std::string preset;                  ///< which of the file's presets; "" for none
   std::string library;                 ///< shared library with rows of the user's own; "" for none
   std::string algorithm = "pmeta";     ///< a name of algorithms()
-  std::string learner = "q_learning";  ///< q_learning (tables), dqn or sac (networks)
+  std::string learner = "q_learning";  ///< a name of learners()
   std::string arithmetic = "native";   ///< of networks: native or portable
   std::int64_t seed = 0;
   int rounds = 10;              ///< C
@@ -49,9 +46,6 @@ struct ExperimentSettings {
   std::string key_file;         ///< of the key that messages are authenticated with; "" for none
   int fresh_episodes = 0;       ///< local runner: episodes of the evaluation after the last round
   PersonalSettings personal;
-  QLearningSettings q_learning;  ///< with learner q_learning
-  DqnSettings dqn;               ///< with learner dqn
-  SacSettings sac;               ///< with learner sac
   AggregationSettings aggregation;
   std::string environment = "gridworld";
 };

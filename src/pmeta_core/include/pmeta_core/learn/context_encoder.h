@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "pmeta_core/base/rng.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/nn/aligned.h"
 #include "pmeta_core/nn/mlp.h"
@@ -51,6 +52,9 @@ struct LatentPosterior {
 
 /// Sum over dimensions of KL(q || N(0, I)) = (variance + mean^2 - 1 - log variance) / 2.
 double klToPrior(const LatentPosterior& posterior);
+
+/// Draws z = mean + sqrt(variance) * noise with standard normal `noise`; [latent_size] each.
+void drawLatent(const LatentPosterior& posterior, Rng& rng, double* noise, float* z);
 
 /// q(z|c) of a set of transitions: a network maps each context row (s, a, r[, s']) to the mean mu_i
 /// and variance s_i^2 = max(softplus(.), 1e-7) of a Gaussian factor, and their product, in which

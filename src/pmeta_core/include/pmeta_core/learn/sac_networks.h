@@ -1,13 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "pmeta_core/act/policy_family.h"
 #include "pmeta_core/env/env.h"
 #include "pmeta_core/learn/context_encoder.h"
 #include "pmeta_core/learn/sac_settings.h"
-#include "pmeta_core/nn/aligned.h"
 #include "pmeta_core/nn/mlp.h"
 
 namespace pmeta {
@@ -23,14 +24,6 @@ std::vector<float> oneHot(int task, int num_tasks);
 /// one-hot vector, the encoder's z, or nothing.
 class SacNetworks {
  public:
-  /// Room for acting on up to `max_batch` observations at once.
-  struct ActorWorkspace {
-    ActorWorkspace(const SacNetworks& networks, std::size_t max_batch);
-
-    MlpWorkspace mlp;
-    AlignedFloats input;  // [max_batch, actor inputs]
-  };
-
   /// `num_tasks`: length of the one-hot vector; ignored unless task_encoding is "one_hot". Throws
   /// Error if actions are discrete or there is no task to encode.
   SacNetworks(const EnvSpec& env, const SacSettings& settings, int num_tasks);
@@ -53,21 +46,29 @@ class SacNetworks {
   /// Each network as Mlp::initialise() does.
   void initialise(float* parameters, Rng& rng) const;
 
-  /// Heads [batch, 2 * action_size] for `observations` [batch, observation_size], each with
-  /// `task_input` appended. They lie in the workspace.
-  const float* heads(const float* parameters, const float* observations, std::size_t batch,
-                     const float* task_input, ActorWorkspace& workspace) const;
-
-  /// Writes tanh(mean) for each observation, [batch, action_size].
-  void greedyActions(const float* parameters, const float* observations, std::size_t batch,
-                     const float* task_input, ActorWorkspace& workspace, double* actions) const;
-
  private:
   std::size_t observation_size_;
   std::size_t action_size_;
   std::size_t task_input_size_;
   Mlp actor_, critic1_, critic2_;
   std::optional<ContextEncoder> encoder_;
+};
+
+/// Policies of those networks: tanh(mean) of the actor.
+class SacPolicies : public PolicyFamily {
+ public:
+  /// As SacNetworks.
+  SacPolicies(const EnvSpec& env, const SacSettings& settings, int num_tasks);
+
+  const SacNetworks& networks() const { return networks_; }
+
+  std::size_t taskInputSize() const override { return networks_.taskInputSize(); }
+  void initialise(Model& parameters, Rng& rng) const override;
+  std::unique_ptr<Actor> actor(const Model& parameters, std::vector<float> task_input,
+                               std::size_t max_batch) const override;
+
+ private:
+  SacNetworks networks_;
 };
 
 }  // namespace pmeta

@@ -1,26 +1,10 @@
 #pragma once
 
-#include <cstddef>
-#include <vector>
-
+#include "pmeta_core/act/episode.h"
+#include "pmeta_core/act/table_policies.h"
 #include "pmeta_core/env/tabular_env.h"
 
 namespace pmeta {
-
-/// Action values, row-major: entry (state, action) at state * num_actions + action.
-using QTable = std::vector<double>;
-
-/// Return of a policy on one task.
-struct ReturnStats {
-  double mean = 0;
-  double std = 0;    ///< standard deviation over episodes (population)
-  int episodes = 0;  ///< episodes, or start states where the average is exact
-  int broken_episodes =
-      0;  ///< whose simulation broke down: they count with their return until then
-};
-
-/// The action of the largest value; the lowest index wins a tie.
-int greedyAction(const double* action_values, int num_actions);
 
 /// r(s,a) + gamma * E max_a' Q(s',a'), the Bellman optimality backup of one entry (paper, Section
 /// "Personalized Multi-task Value Iteration"), by the known model.

@@ -1,8 +1,25 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 namespace pmeta {
+
+/// Strengths of the pull that one kind of network has of its own; those without have that of all.
+/// At 0 they are each robot's own: a round does not reset them, and what is sent of them stays the
+/// meta-policy's.
+struct NetworkLambdas {
+  std::optional<double> actor;
+  std::optional<double> critic;  ///< of all critics
+  std::optional<double> encoder;
+
+  /// That of the network whose blocks are named "<network>.<...>".
+  std::optional<double> of(const std::string& network) const {
+    if (network.rfind("critic", 0) == 0) return critic;
+    if (network == "actor") return actor;
+    return network == "encoder" ? encoder : std::nullopt;
+  }
+};
 
 /// Step sizes of the personalised and auxiliary updates (paper, eqs. per_update0 and
 /// local_update0).
@@ -15,11 +32,7 @@ struct PersonalSettings {
 
   // networks only
   double learning_rate = 1e-3;  ///< Adam's
-  // soft actor-critic only: a strength for one kind of network; -1: `lambda`. At 0 those networks
-  // are each robot's own: neither reset nor shared
-  double lambda_actor = -1;
-  double lambda_critic = -1;
-  double lambda_encoder = -1;
+  NetworkLambdas lambdas;       ///< of some networks their own
   std::string proximal =
       "decoupled";  ///< the pull after Adam's step, or "coupled": in its gradient
 };

@@ -20,7 +20,7 @@ class TaskFailed : public Error {
 std::string divergence(const Model& model);
 
 /// What to do where training diverges: a clause that names the settings, with their values.
-std::string stepSizes(const ExperimentSettings& settings);
+std::string stepSizes(const Experiment& experiment);
 
 /// What to do where the simulation breaks down.
 std::string simulationSettings(const ExperimentSettings& settings);

@@ -5,7 +5,6 @@
 
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/env/env.h"
-#include "pmeta_core/env/tabular_env.h"
 #include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/messages/protocol.h"
 #include "pmeta_core/storage/policy_file.h"
@@ -20,8 +19,8 @@ class LoadedPolicy {
   /// file is none of a policy, its parameters do not fit its own settings, or it must be told a
   /// task.
   explicit LoadedPolicy(const std::string& path, int as_task = -1);
-  ~LoadedPolicy();
-  LoadedPolicy(LoadedPolicy&&) noexcept;
+  LoadedPolicy(const LoadedPolicy&) = delete;
+  LoadedPolicy& operator=(const LoadedPolicy&) = delete;
 
   const Experiment& experiment() const { return experiment_; }
   const EnvSpec& spec() const { return env_->spec(); }
@@ -40,12 +39,7 @@ class LoadedPolicy {
   bool act(const double* observation, double* action);
 
  private:
-  class Network;
-  class QNetwork;
-  class Actor;
-
   LoadedPolicy(const std::string& path, PolicyFile file, int as_task);
-  bool actFromTable(const double* observation, double* action) const;
   std::vector<float> taskInput(const PolicyFile& file, const std::string& path, int as_task) const;
 
   Experiment experiment_;
@@ -54,8 +48,11 @@ class LoadedPolicy {
   int task_ = -1;
   int round_ = 0;
   std::unique_ptr<Env> env_;  ///< of its task, or of task 0 for a meta-policy
-  const TabularEnv* table_ = nullptr;
-  std::unique_ptr<Network> network_;
+  std::unique_ptr<PolicyFamily> policies_;
+  std::unique_ptr<Actor> actor_;
+  std::vector<std::size_t> envs_ = {0};  ///< as the actor is to be asked
+  std::vector<float> observation_;
+  Rng greedy_{0, 0, Stream::kEvaluate};  ///< which draws nothing
 };
 
 }  // namespace pmeta

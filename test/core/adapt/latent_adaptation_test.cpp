@@ -1,4 +1,4 @@
-#include "pmeta_core/learn/context_adaptation.h"
+#include "pmeta_core/adapt/latent_adaptation.h"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../support.h"
+#include "pmeta_core/act/evaluation.h"
 #include "pmeta_core/learn/sac.h"
 #include "pmeta_core/personal/proximal_adam.h"
 
@@ -28,13 +29,13 @@ class Direction : public Env {
     observation[0] = start_ = rng.uniform();
   }
   Step step(const double* action, Rng&, double* observation) override {
-    actions.push_back(action[0]);
+    if (log != nullptr) log->push_back(action[0]);
     observation[0] = start_;
     Step step{direction_ * action[0], false, ++t_ == spec_.horizon};
     if (sparse) step.sparse_reward = 7;
     return step;
   }
-  std::vector<double> actions;  // all that were taken
+  std::vector<double>* log = nullptr;  // of all actions
   bool sparse = false;
 
  private:
@@ -59,15 +60,34 @@ SacSettings smallSettings() {
   return settings;
 }
 
+// what is known of the task after each episode of exploration
+std::vector<std::vector<float>> known(const SacNetworks& networks, const ContextSettings& settings,
+                                      const float* parameters, std::unique_ptr<Env> env,
+                                      int episodes, Rng rng) {
+  std::vector<std::unique_ptr<Env>> envs;
+  envs.push_back(std::move(env));
+  Evaluation exploration(std::move(envs));
+  LatentAdaptation adaptation(networks, settings, parameters);
+  EXPECT_EQ(adaptation.taskInput(), std::vector<float>(2)) << "the prior's mean";
+  std::vector<std::vector<float>> known;
+  for (int episode = 0; episode < episodes; ++episode) {
+    adaptation.beginEpisode(rng);
+    EXPECT_TRUE(exploration.explore(adaptation, rng));
+    adaptation.episodeOver();
+    known.push_back(adaptation.taskInput());
+  }
+  return known;
+}
+
 struct Untrained {
   Untrained() : networks(Direction(1).spec(), smallSettings(), 0), parameters(networks.size()) {
     Rng rng(1, 0, Stream::kInitialise);
     networks.initialise(parameters.data(), rng);
   }
-  std::vector<Adaptation> adaptTo(Env& env, const ContextSettings& settings,
-                                  std::uint64_t seed = 0) const {
-    Rng rng(seed, 0, Stream::kEvaluate);
-    return adapt(networks, settings, parameters.data(), env, rng);
+  std::vector<std::vector<float>> exploring(std::unique_ptr<Env> env,
+                                            const ContextSettings& settings) const {
+    return known(networks, settings, parameters.data(), std::move(env), 3,
+                 Rng(0, 0, Stream::kEvaluate));
   }
   SacNetworks networks;
   AlignedFloats parameters;
@@ -76,12 +96,11 @@ struct Untrained {
 TEST(Adapt, ActsOnTheMeanOfThePosteriorOfAllTransitions) {
   const Untrained sac;
   const ContextSettings settings = smallSettings().context;
-  Direction env(-1);
-  const std::vector<Adaptation> found = sac.adaptTo(env, settings);
-  ASSERT_EQ(found.size(), 2u);
-  EXPECT_EQ(found[0].episodes, 1);
-  EXPECT_EQ(found[1].episodes, 3);
-  EXPECT_EQ(env.actions.size(), 30u);
+  std::vector<double> actions;
+  auto env = std::make_unique<Direction>(-1);
+  env->log = &actions;
+  const std::vector<std::vector<float>> found = sac.exploring(std::move(env), settings);
+  ASSERT_EQ(actions.size(), 30u);
 
   // rows (s, a, r) again: starts and actions follow from the same generator
   Rng rng(0, 0, Stream::kEvaluate);
@@ -94,17 +113,15 @@ TEST(Adapt, ActsOnTheMeanOfThePosteriorOfAllTransitions) {
                   rows.size() / 3, workspace, posterior);
   };
   for (int episode = 0; episode < 3; ++episode) {
-    infer();  // of all episodes before; first the prior
     for (int j = 0; j < 2; ++j) rng.normal();
     const auto start = static_cast<float>(rng.uniform());
     for (int t = 0; t < 10; ++t) {
-      const double action = env.actions[static_cast<std::size_t>(10 * episode + t)];
+      const double action = actions[static_cast<std::size_t>(10 * episode + t)];
       rows.insert(rows.end(), {start, static_cast<float>(action), static_cast<float>(-action)});
     }
-    if (episode == 1) continue;
     infer();
     for (std::size_t j = 0; j < 2; ++j) {
-      EXPECT_NEAR(found[episode == 0 ? 0 : 1].latent[j], posterior.mean[j], 1e-6);
+      EXPECT_NEAR(found[static_cast<std::size_t>(episode)][j], posterior.mean[j], 1e-6);
     }
   }
 }
@@ -114,21 +131,23 @@ TEST(Adapt, ActsByTheMeanUnlessNoiseIsWanted) {
   ContextSettings settings = smallSettings().context;
   for (const bool noise : {false, true}) {
     settings.exploration_noise = noise;
-    Direction env(1);
-    sac.adaptTo(env, settings);
+    std::vector<double> actions;
+    auto env = std::make_unique<Direction>(1);
+    env->log = &actions;
+    sac.exploring(std::move(env), settings);
     // observation and z stay within an episode, so the mean does
-    EXPECT_EQ(env.actions[0] == env.actions[1], !noise);
-    EXPECT_NE(env.actions[0], env.actions[10]) << "each episode has a z of its own";
+    EXPECT_EQ(actions[0] == actions[1], !noise);
+    EXPECT_NE(actions[0], actions[10]) << "each episode has a z of its own";
   }
 }
 
 TEST(Adapt, CountsTheRewardThatMatters) {
   const Untrained sac;
-  Direction dense(1), sparse(1);
-  sparse.sparse = true;
+  auto dense = std::make_unique<Direction>(1), sparse = std::make_unique<Direction>(1);
+  sparse->sparse = true;
   const ContextSettings settings = smallSettings().context;
-  EXPECT_NE(sac.adaptTo(dense, settings).back().latent,
-            sac.adaptTo(sparse, settings).back().latent);
+  EXPECT_NE(sac.exploring(std::move(dense), settings).back(),
+            sac.exploring(std::move(sparse), settings).back());
 }
 
 TEST(Adapt, RefusesNetworksWithoutAnEncoder) {
@@ -136,27 +155,17 @@ TEST(Adapt, RefusesNetworksWithoutAnEncoder) {
   settings.task_encoding = "none";
   const SacNetworks networks(Direction(1).spec(), settings, 0);
   const AlignedFloats parameters(networks.size());
-  Direction env(1);
-  Rng rng(0, 0, Stream::kEvaluate);
-  EXPECT_EQ(test::errorOf([&] { adapt(networks, settings.context, parameters.data(), env, rng); }),
+  EXPECT_EQ(test::errorOf([&] { LatentAdaptation(networks, settings.context, parameters.data()); }),
             "adapting to a task needs the context encoder: set task_encoding to inference.");
 }
 
 // undiscounted return of one episode by tanh(mean) with that z
-double returnWith(const SacNetworks& networks, const float* parameters, Env& env,
+double returnWith(const SacNetworks& networks, const float* parameters, double direction,
                   const std::vector<float>& z) {
-  SacNetworks::ActorWorkspace workspace(networks, 1);
+  GaussianActor actor(networks.actor(), z, 1, GaussianActor::By::kMean, parameters);
   Rng rng(9, 0, Stream::kEvaluate);
-  double observation = 0, action = 0, sum = 0;
-  Step step;
-  env.reset(rng, &observation);
-  while (!step.truncated) {
-    const auto seen = static_cast<float>(observation);
-    networks.greedyActions(parameters, &seen, 1, z.data(), workspace, &action);
-    step = env.step(&action, rng, &observation);
-    sum += step.reward;
-  }
-  return sum;
+  Evaluation evaluation(makeEnvs([&](int) { return std::make_unique<Direction>(direction); }, 1));
+  return evaluation.run(actor, rng).mean;
 }
 
 TEST(Adapt, EncoderTellsTwoOppositeTasksApart) {
@@ -184,17 +193,18 @@ TEST(Adapt, EncoderTellsTwoOppositeTasksApart) {
     }
   }
   for (std::size_t task = 0; task < 2; ++task) {
-    Direction env(directions[task]);
-    Rng rng(4, task, Stream::kEvaluate);
-    const std::vector<Adaptation> known =
-        adapt(networks, smallSettings().context, parameters.data(), env, rng);
-    EXPECT_GT(returnWith(networks, parameters.data(), env, known.back().latent), 7)
-        << "of 10 in direction " << directions[task];
-    const LatentPosterior own = learners[task]->contextPosterior(parameters.data());
-    EXPECT_GT(returnWith(networks, parameters.data(), env, {own.mean.begin(), own.mean.end()}), 7);
-    const LatentPosterior other = learners[1 - task]->contextPosterior(parameters.data());
-    EXPECT_LT(returnWith(networks, parameters.data(), env, {other.mean.begin(), other.mean.end()}),
-              -7);
+    const std::vector<std::vector<float>> z =
+        known(networks, smallSettings().context, parameters.data(),
+              std::make_unique<Direction>(directions[task]), 3, Rng(4, task, Stream::kEvaluate));
+    const auto returned = [&](const std::vector<float>& task_input) {
+      return returnWith(networks, parameters.data(), directions[task], task_input);
+    };
+    EXPECT_GT(returned(z.back()), 7) << "of 10 in direction " << directions[task];
+    const float* encoder = parameters.data() + networks.encoderOffset();
+    const LatentPosterior own = learners[task]->context().posterior(encoder);
+    EXPECT_GT(returned({own.mean.begin(), own.mean.end()}), 7);
+    const LatentPosterior other = learners[1 - task]->context().posterior(encoder);
+    EXPECT_LT(returned({other.mean.begin(), other.mean.end()}), -7);
     double distance = 0, deviation = 0;
     for (std::size_t j = 0; j < own.mean.size(); ++j) {
       distance += std::pow(own.mean[j] - other.mean[j], 2);

@@ -1,12 +1,39 @@
-#include "pmeta_core/personal/evaluation.h"
+#include "pmeta_core/act/evaluation.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <utility>
 #include <vector>
+
+#include "../support.h"
 
 namespace pmeta {
 namespace {
+
+// acts by a function of all observations at once; an action is one number
+class FunctionActor : public Actor {
+ public:
+  using Function = std::function<void(const float* observations, int batch, double* actions)>;
+
+  explicit FunctionActor(Function function) : function_(std::move(function)) {}
+  void look(const float* observations, const std::vector<std::size_t>& envs) override {
+    actions_.resize(envs.size());
+    function_(observations, static_cast<int>(envs.size()), actions_.data());
+  }
+  bool act(std::size_t row, Rng&, double* action) override {
+    *action = actions_[row];
+    return knows;
+  }
+
+  bool knows = true;
+
+ private:
+  Function function_;
+  std::vector<double> actions_;
+};
 
 // counts up from a random start by the action; ends above 10, or after 20 steps
 class Counter : public Env {
@@ -50,7 +77,7 @@ Evaluation makeEvaluation(int episodes) {
 // even numbers go up by one, odd ones by three
 double actionAt(float observation) { return std::fmod(observation, 2.0f) == 0 ? 1 : 3; }
 
-void act(const float* observations, int batch, double* actions) {
+void actions(const float* observations, int batch, double* actions) {
   for (int b = 0; b < batch; ++b) {
     EXPECT_EQ(observations[2 * b + 1], -observations[2 * b]) << "rows stay together";
     actions[b] = actionAt(observations[2 * b]);
@@ -82,7 +109,7 @@ TEST(Evaluation, CountsTheSparseRewardWhereThereIsOne) {
   envs.push_back(std::make_unique<Sparse>());
   Evaluation evaluation(std::move(envs));
   Rng rng(1, 0, Stream::kEvaluate);
-  const auto still = [](const float*, int, double* actions) { actions[0] = 0; };
+  FunctionActor still([](const float*, int, double* actions) { actions[0] = 0; });
   EXPECT_EQ(evaluation.run(still, rng).mean, 3);
   const Episode episode = evaluation.record(still, rng);
   EXPECT_EQ(episode.rewards, std::vector<double>{3});
@@ -93,6 +120,7 @@ TEST(Evaluation, CountsTheSparseRewardWhereThereIsOne) {
 TEST(Evaluation, IsTheMeanOverEpisodesRunOneByOne) {
   for (const int episodes : {1, 2, 10, 37}) {
     Evaluation evaluation = makeEvaluation(episodes);
+    FunctionActor act(actions);
     Rng rng(1, 0, Stream::kEvaluate), same = rng;
     std::vector<double> returns;
     double mean = 0, squares = 0;
@@ -112,17 +140,17 @@ TEST(Evaluation, StopsAtTheHorizon) {
   Evaluation evaluation = makeEvaluation(3);
   int calls = 0;
   Rng rng(2, 0, Stream::kEvaluate);
-  evaluation.run(
-      [&](const float*, int batch, double* actions) {
-        ++calls;
-        for (int b = 0; b < batch; ++b) actions[b] = 0;
-      },
-      rng);
+  FunctionActor still([&](const float*, int batch, double* actions) {
+    ++calls;
+    for (int b = 0; b < batch; ++b) actions[b] = 0;
+  });
+  evaluation.run(still, rng);
   EXPECT_EQ(calls, 20);
 }
 
 TEST(Evaluation, RecordsTheFirstEpisode) {
   Evaluation evaluation = makeEvaluation(5);
+  FunctionActor act(actions);
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
     Rng rng(seed, 0, Stream::kEvaluate), same = rng;
     const Episode e = evaluation.record(act, rng);
@@ -177,9 +205,8 @@ TEST(Evaluation, AnEpisodeThatBreaksDownCountsWithItsReturnUntilThen) {
   for (const int breaks_at : {3, 9, 0, 1}) envs.push_back(std::make_unique<Fragile>(breaks_at));
   Evaluation evaluation(std::move(envs));
   Rng rng(1, 0, Stream::kEvaluate);
-  const auto still = [](const float*, int batch, double* actions) {
-    std::fill_n(actions, batch, 0);
-  };
+  FunctionActor still(
+      [](const float*, int batch, double* actions) { std::fill_n(actions, batch, 0); });
   for (int again = 0; again < 2; ++again) {
     const ReturnStats stats = evaluation.run(still, rng);
     EXPECT_EQ(stats.episodes, 4);
@@ -191,6 +218,31 @@ TEST(Evaluation, AnEpisodeThatBreaksDownCountsWithItsReturnUntilThen) {
   EXPECT_EQ(episode.observations, (std::vector<double>{0, 1, 2})) << "without what broke it";
   EXPECT_TRUE(episode.truncated);
   EXPECT_FALSE(episode.terminated);
+}
+
+TEST(Evaluation, ExploringTellsWhetherTheEpisodeBrokeDown) {
+  for (const int breaks_at : {0, 3, 9}) {
+    std::vector<std::unique_ptr<Env>> envs;
+    envs.push_back(std::make_unique<Fragile>(breaks_at));
+    Evaluation evaluation(std::move(envs));
+    Rng rng(1, 0, Stream::kEvaluate);
+    int looks = 0;
+    FunctionActor still([&](const float*, int, double* actions) {
+      ++looks;
+      actions[0] = 0;
+    });
+    EXPECT_EQ(evaluation.explore(still, rng), breaks_at == 9);
+    EXPECT_EQ(looks, std::min(breaks_at, 5));
+  }
+}
+
+TEST(Evaluation, AnActorThatKnowsNoActionIsAnError) {
+  Evaluation evaluation = makeEvaluation(2);
+  FunctionActor lost(actions);
+  lost.knows = false;
+  Rng rng(1, 0, Stream::kEvaluate);
+  EXPECT_EQ(test::errorOf([&] { evaluation.run(lost, rng); }),
+            "the policy knows no action where an episode of counter has come to.");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "pmeta_core/learn/broken_episodes.h"
+#include "pmeta_core/act/broken_episodes.h"
 
 #include <string>
 
@@ -6,8 +6,9 @@ namespace pmeta {
 
 void BrokenEpisodes::broke(const BrokenEpisode& episode) {
   ++count_;
-  if (++running_ < kMostRunning) return;
-  throw BrokenEpisode(std::to_string(kMostRunning) +
+  if (++running_ <= forgiven_) return;
+  if (forgiven_ == 0) throw episode;
+  throw BrokenEpisode(std::to_string(running_) +
                       " episodes running have broken down, the last one in " + episode.reason());
 }
 
@@ -17,7 +18,7 @@ void BrokenEpisodes::saveState(StateWriter& writer) const {
 }
 
 void BrokenEpisodes::loadState(StateReader& reader) {
-  running_ = static_cast<int>(reader.count("running", 0, kMostRunning - 1));
+  running_ = static_cast<int>(reader.count("running", 0, forgiven_));
   count_ = reader.count("count");
 }
 

@@ -1,4 +1,4 @@
-#include "pmeta_core/learn/gaussian_policy.h"
+#include "pmeta_core/act/gaussian_policy.h"
 
 #include <gtest/gtest.h>
 

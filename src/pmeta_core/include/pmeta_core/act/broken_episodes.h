@@ -7,16 +7,16 @@
 
 namespace pmeta {
 
-/// Counts the training episodes whose simulation broke down, and gives up where one after the other
-/// does.
+/// Counts the episodes whose simulation broke down, and gives up where one after the other does.
 class BrokenEpisodes {
  public:
-  static constexpr int kMostRunning = 10;
+  /// So many running are forgiven.
+  explicit BrokenEpisodes(int forgiven) : forgiven_(forgiven) {}
 
   /// An episode has come to its end.
   void ended() { running_ = 0; }
 
-  /// An episode has broken down. Throws BrokenEpisode if it is the tenth running.
+  /// An episode has broken down. Throws BrokenEpisode if there are now more than are forgiven.
   void broke(const BrokenEpisode& episode);
 
   std::int64_t count() const { return count_; }  ///< in all
@@ -25,6 +25,7 @@ class BrokenEpisodes {
   void loadState(StateReader& reader);
 
  private:
+  int forgiven_;
   int running_ = 0;  // since the last that came to its end
   std::int64_t count_ = 0;
 };

@@ -1,4 +1,4 @@
-#include "pmeta_core/learn/broken_episodes.h"
+#include "pmeta_core/act/broken_episodes.h"
 
 #include <gtest/gtest.h>
 
@@ -16,20 +16,26 @@ namespace {
 using test::errorOf;
 
 TEST(BrokenEpisodes, TheTenthRunningIsOneTooMany) {
-  BrokenEpisodes broken;
+  BrokenEpisodes broken(9);
   const BrokenEpisode episode("env, step 3: qpos[0] is not finite");
   for (int i = 0; i < 9; ++i) broken.broke(episode);
   broken.ended();
   for (int i = 0; i < 9; ++i) broken.broke(episode);
   EXPECT_EQ(broken.count(), 18);
 
-  BrokenEpisodes loaded;
+  BrokenEpisodes loaded(9);
   test::load(loaded, test::stateOf(broken));
   EXPECT_EQ(loaded.count(), 18);
   EXPECT_EQ(errorOf([&] { loaded.broke(episode); }),
             "10 episodes running have broken down, the last one in env, step 3: qpos[0] is not "
             "finite; the episode cannot go on, reset it.");
   EXPECT_EQ(loaded.count(), 19);
+}
+
+TEST(BrokenEpisodes, WhereNoneIsForgivenTheFirstIsGivenOn) {
+  BrokenEpisodes broken(0);
+  EXPECT_EQ(errorOf([&] { broken.broke(BrokenEpisode("env, step 3: it broke")); }),
+            "env, step 3: it broke; the episode cannot go on, reset it.");
 }
 
 // counts episodes in its observation; of those in `broken` the third step breaks
@@ -110,7 +116,7 @@ TEST(BrokenEpisodes, TrainingGivesUpWhereEachEpisodeBreaks) {
     const std::vector<float> parameters = parametersOf(learner);
     Rng rng(1, 0, Stream::kSample);
     EXPECT_THROW(learner.collect(parameters.data(), rng), BrokenEpisode);
-    EXPECT_EQ(learner.brokenEpisodes(), BrokenEpisodes::kMostRunning);
+    EXPECT_EQ(learner.brokenEpisodes(), SacCollector::kForgiven + 1);
     EXPECT_EQ(learner.replay().size(), starts ? 20u : 0u);
   }
 }

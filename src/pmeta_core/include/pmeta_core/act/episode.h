@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace pmeta {
+
+/// Return of a policy on one task.
+struct ReturnStats {
+  double mean = 0;
+  double std = 0;    ///< standard deviation over episodes (population)
+  int episodes = 0;  ///< episodes, or start states where the average is exact
+  int broken_episodes =
+      0;  ///< whose simulation broke down: they count with their return until then
+};
+
+/// One evaluation episode, for people to look at. Never part of what training exchanges.
+struct Episode {
+  int observation_size = 0;
+  int action_size = 0;
+  std::vector<double> observations;  ///< (steps + 1) x observation_size, row-major
+  std::vector<double> actions;       ///< steps x action_size, row-major
+  std::vector<double> rewards;       ///< steps
+  int position_size = 0;
+  std::vector<double> positions;  ///< (steps + 1) x position_size, see Env::configuration()
+  bool terminated = false;
+  bool truncated = false;
+  std::vector<double> state_values;  ///< tabular tasks: max_a Q(s,a) by state, NaN where not owned
+  std::vector<std::int32_t> greedy_actions;  ///< tabular tasks: argmax_a Q(s,a), -1 where not owned
+  int action_grid = 0;  ///< actions along each axis of `action_values`; 0: there are none
+  std::vector<float>
+      action_values;  ///< two-dimensional actions: Q at the start, see actionValues()
+};
+
+}  // namespace pmeta

@@ -1,0 +1,225 @@
+#include "pmeta_core/learn/sac_update.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/nn/kernels.h"
+
+namespace pmeta {
+namespace {
+
+std::size_t countContexts(const SacSettings& settings) {
+  if (settings.task_encoding != "inference") return 0;
+  if (settings.context.per_update > settings.batch_size) {
+    throw Error("soft actor-critic cannot share a batch of " + std::to_string(settings.batch_size) +
+                " transitions among " + std::to_string(settings.context.per_update) +
+                " contexts: contexts_per_update is at most batch_size.");
+  }
+  return static_cast<std::size_t>(settings.context.per_update);
+}
+
+}  // namespace
+
+SacUpdate::SacUpdate(const SacNetworks& networks, const SacSettings& settings,
+                     std::vector<float> task_input)
+    : networks_(networks),
+      reward_scale_(settings.reward_scale),
+      tau_(settings.tau),
+      kl_weight_(settings.context.kl_weight),
+      batch_(static_cast<std::size_t>(settings.batch_size)),
+      observation_size_(networks.observationSize()),
+      action_size_(networks.actionSize()),
+      task_input_(std::move(task_input)),
+      temperature_(settings.temperature, static_cast<int>(action_size_)),
+      targets_(networks_.critic(0).size() + networks_.critic(1).size()),
+      actor_workspace_(networks_.actor(), 2 * batch_),
+      policy_(action_size_, 2 * batch_),
+      actor_input_(2 * batch_ * networks_.actor().inputs()),
+      critic_input_(batch_ * networks_.critic(0).inputs()),
+      next_critic_input_(critic_input_),
+      rewards_(batch_),
+      discounts_(batch_),
+      y_(batch_),
+      errors_(batch_),
+      d_q_(batch_),
+      d_action_rows_(batch_ * action_size_),
+      d_action_(batch_ * action_size_),
+      d_heads_(2 * batch_ * action_size_),
+      gradient_(std::max(networks_.actor().size(), networks_.critic(0).size())) {
+  const std::size_t contexts = countContexts(settings);
+  for (int k = 0; k < 2; ++k) {
+    critic_workspaces_.emplace_back(networks_.critic(k), batch_);
+    minimum_rows_[k].reserve(batch_);
+  }
+  if (contexts == 0) return;
+  const ContextEncoder& encoder = networks_.encoder();
+  for (std::size_t k = 0; k < contexts; ++k) tasks_.emplace_back(encoder, settings.context);
+  d_latent_rows_.resize(batch_ * encoder.latentSize());
+  encoder_gradient_.resize(encoder.network().size());
+  gradient_.resize(std::max(gradient_.size(), encoder.network().size()));
+}
+
+void SacUpdate::resetTargets(const float* parameters) {
+  for (int k = 0; k < 2; ++k) {
+    std::copy_n(parameters + networks_.criticOffset(k), networks_.critic(k).size(), target(k));
+  }
+}
+
+// into the inputs of all networks; the next actions are not known yet
+void SacUpdate::put(std::size_t row, const Transition& t) {
+  const std::vector<float>& x = tasks_.empty() ? task_input_ : taskOf(row).z;
+  const std::size_t actor_row = networks_.actor().inputs();
+  const auto write = [&](const float* observation, float* actor, float* critic) {
+    std::copy_n(observation, observation_size_, actor);
+    std::copy(x.begin(), x.end(), actor + observation_size_);
+    return std::copy_n(actor, actor_row, critic);
+  };
+  const std::size_t critic_row = row * networks_.critic(0).inputs();
+  float* action = write(t.observation, &actor_input_[row * actor_row], &critic_input_[critic_row]);
+  std::copy_n(t.action, action_size_, action);
+  write(t.next_observation, &actor_input_[(batch_ + row) * actor_row],
+        &next_critic_input_[critic_row]);
+  rewards_[row] = t.reward;
+  discounts_[row] = t.discount;
+}
+
+SacLosses SacUpdate::apply(const float* parameters, Optimizer<float>& optimizer, Rng& rng) {
+  for (InferredTask& task : tasks_) std::fill(task.d_z.begin(), task.d_z.end(), 0.0f);
+  // one pass for the actions in s' and in s: the actor does not move before its own step
+  const float* heads =
+      networks_.actor().forward(parameters, actor_input_.data(), 2 * batch_, actor_workspace_);
+  policy_.sample(heads, 2 * batch_, rng);
+  computeTargets();
+
+  SacLosses losses;
+  for (int k = 0; k < 2; ++k) losses.critic += 0.5 * updateCritic(k, parameters, optimizer);
+  if (networks_.hasEncoder()) losses.kl = updateEncoder(parameters, optimizer);
+  losses.actor = updateActor(parameters, optimizer);
+
+  double mean_log_prob = 0;
+  for (std::size_t b = 0; b < batch_; ++b) mean_log_prob += policy_.logProbs()[b];
+  mean_log_prob /= static_cast<double>(batch_);
+  temperature_.update(mean_log_prob);
+  losses.entropy = -mean_log_prob;
+  losses.temperature = temperature_.value();
+  ++updates_;
+  return losses;
+}
+
+void SacUpdate::computeTargets() {
+  const std::size_t row = networks_.critic(0).inputs();
+  const float* next_actions = policy_.actions() + batch_ * action_size_;
+  for (std::size_t b = 0; b < batch_; ++b) {
+    std::copy_n(next_actions + b * action_size_, action_size_,
+                &next_critic_input_[(b + 1) * row - action_size_]);
+  }
+  const float* q[2];
+  for (int k = 0; k < 2; ++k) {
+    q[k] = networks_.critic(k).forward(target(k), next_critic_input_.data(), batch_,
+                                       critic_workspaces_[static_cast<std::size_t>(k)]);
+  }
+  const float* log_prob = policy_.logProbs() + batch_;
+  const auto alpha = static_cast<float>(temperature_.value());
+  const auto scale = static_cast<float>(reward_scale_);
+  for (std::size_t b = 0; b < batch_; ++b) {
+    const float smaller = q[0][b] <= q[1][b] ? q[0][b] : q[1][b];
+    y_[b] = scale * rewards_[b] + discounts_[b] * (smaller - alpha * log_prob[b]);
+  }
+}
+
+double SacUpdate::updateCritic(int k, const float* parameters, Optimizer<float>& optimizer) {
+  const Mlp& critic = networks_.critic(k);
+  const float* theta = parameters + networks_.criticOffset(k);
+  MlpWorkspace& workspace = critic_workspaces_[static_cast<std::size_t>(k)];
+  const float* q = critic.forward(theta, critic_input_.data(), batch_, workspace);
+  for (std::size_t b = 0; b < batch_; ++b) errors_[b] = q[b] - y_[b];
+  const double loss = kernels().squaredLoss(errors_.data(), nullptr, d_q_.data(), batch_);
+  const std::size_t latent = d_latent_rows_.size() / batch_;  // 0 without an encoder
+  critic.backward(theta, critic_input_.data(), batch_, d_q_.data(), gradient_.data(),
+                  observation_size_, latent, latent == 0 ? nullptr : d_latent_rows_.data(),
+                  workspace);
+  for (std::size_t b = 0; b < batch_ && latent > 0; ++b) {
+    float* d_z = taskOf(b).d_z.data();
+    for (std::size_t j = 0; j < latent; ++j) d_z[j] += d_latent_rows_[b * latent + j];
+  }
+  optimizer.apply(networks_.criticOffset(k), gradient_.data(), critic.size(), target(k), tau_);
+  return loss;
+}
+
+double SacUpdate::updateEncoder(const float* parameters, Optimizer<float>& optimizer) {
+  const ContextEncoder& encoder = networks_.encoder();
+  const std::size_t size = encoder.network().size();
+  const auto n = static_cast<double>(tasks_.size());
+  double kl = 0;
+  std::fill_n(gradient_.begin(), size, 0.0f);
+  for (InferredTask& task : tasks_) {
+    kl += klToPrior(task.posterior) / n;
+    encoder.backward(parameters + networks_.encoderOffset(), task.rows.data(),
+                     task.rows.size() / encoder.rowSize(), task.posterior, task.noise.data(),
+                     task.d_z.data(), kl_weight_ / n, task.workspace, encoder_gradient_.data());
+    for (std::size_t k = 0; k < size; ++k) gradient_[k] += encoder_gradient_[k];
+  }
+  optimizer.apply(networks_.encoderOffset(), gradient_.data(), size);
+  return kl;
+}
+
+double SacUpdate::updateActor(const float* parameters, Optimizer<float>& optimizer) {
+  const std::size_t row = networks_.critic(0).inputs();
+  for (std::size_t b = 0; b < batch_; ++b) {
+    std::copy_n(policy_.actions() + b * action_size_, action_size_,
+                &critic_input_[(b + 1) * row - action_size_]);
+  }
+  const float* q[2];
+  for (int k = 0; k < 2; ++k) {
+    q[k] = networks_.critic(k).forward(parameters + networks_.criticOffset(k), critic_input_.data(),
+                                       batch_, critic_workspaces_[static_cast<std::size_t>(k)]);
+    minimum_rows_[k].clear();
+  }
+  const double alpha = temperature_.value();
+  double loss = 0;
+  for (std::size_t b = 0; b < batch_; ++b) {
+    const int k = q[0][b] <= q[1][b] ? 0 : 1;
+    minimum_rows_[k].push_back(b);
+    loss += alpha * policy_.logProbs()[b] - q[k][b];
+  }
+  const auto n = static_cast<float>(batch_);
+  std::fill(d_q_.begin(), d_q_.end(), -1 / n);
+  for (int k = 0; k < 2; ++k) actionGradient(k, parameters);
+
+  policy_.backward(batch_, d_action_.data(), static_cast<float>(alpha) / n, d_heads_.data());
+  networks_.actor().backward(parameters, actor_input_.data(), batch_, d_heads_.data(),
+                             gradient_.data(), nullptr, actor_workspace_);
+  optimizer.apply(0, gradient_.data(), networks_.actor().size());
+  return loss / static_cast<double>(batch_);
+}
+
+// gradient by the actions of those samples whose smaller critic is k
+void SacUpdate::actionGradient(int k, const float* parameters) {
+  const std::vector<std::size_t>& rows = minimum_rows_[k];
+  if (rows.empty()) return;
+  networks_.critic(k).backwardInput(parameters + networks_.criticOffset(k), rows.size(),
+                                    d_q_.data(), networks_.actor().inputs(), action_size_,
+                                    d_action_rows_.data(),
+                                    critic_workspaces_[static_cast<std::size_t>(k)], rows.data());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    std::copy_n(&d_action_rows_[i * action_size_], action_size_,
+                &d_action_[rows[i] * action_size_]);
+  }
+}
+
+void SacUpdate::saveState(StateWriter& writer) const {
+  writer.count("updates", updates_);
+  writer.array("targets", targets_);
+  writer.part("temperature", temperature_);
+}
+
+void SacUpdate::loadState(StateReader& reader) {
+  updates_ = reader.count("updates");
+  reader.array("targets", targets_);
+  reader.part("temperature", temperature_);
+}
+
+}  // namespace pmeta

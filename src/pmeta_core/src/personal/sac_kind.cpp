@@ -1,0 +1,95 @@
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+#include "pmeta_core/adapt/latent_adaptation.h"
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/learn/sac.h"
+#include "pmeta_core/personal/learner_kind.h"
+
+namespace pmeta {
+namespace {
+
+class SacKind : public LearnerKind {
+ public:
+  void bind(Settings& settings, PersonalSettings& personal) override {
+    bindAdam(settings, personal);
+    NetworkLambdas& own = personal.lambdas;
+    settings.bind("personal.lambda_actor", own.actor,
+                  "the actor's own strength; -1: lambda; 0: the actor is neither reset nor shared",
+                  Range::atLeast(0));
+    settings.bind("personal.lambda_critic", own.critic, "the same for both critics",
+                  Range::atLeast(0));
+    settings.bind("personal.lambda_encoder", own.encoder, "the same for the inference network",
+                  Range::atLeast(0));
+    pmeta::bind(settings, "sac.", settings_);
+  }
+
+  void check() const override {
+    const std::vector<int>& counts = settings_.context.exploration_episodes;
+    if (std::adjacent_find(counts.begin(), counts.end(), std::greater_equal<int>()) !=
+        counts.end()) {
+      throw Error("sac.exploration_episodes must be ascending, e.g. [5, 15].");
+    }
+  }
+
+  bool hasNetworks() const override { return true; }
+  void setPortable(bool portable) override {
+    settings_.portable = settings_.context.portable = portable;
+  }
+  std::optional<double> linearDiscount() const override { return std::nullopt; }
+  int trainingEnvs() const override { return 0; }
+  std::vector<int> explorationEpisodes() const override {
+    return infers() ? settings_.context.exploration_episodes : std::vector<int>();
+  }
+  // a one-hot input has no place for a task that was not trained on
+  bool servesTestTasks() const override { return !isTold(); }
+
+  PersonalParts make(const LearnerTask& task) const override {
+    SacSettings settings = settings_;
+    // nothing is learnt on a test task: no replay
+    if (!task.trains) settings.buffer_size = settings.batch_size;
+    // where nothing comes back the first meta-policy would explore for ever
+    if (!task.shares) settings.context.explorer = "personal";
+    auto learner = std::make_unique<SacLearner>(
+        task.makeEnv(), settings,
+        isTold() ? oneHot(task.task, task.family->numTasks()) : std::vector<float>());
+    PersonalParts parts;
+    if (infers()) {
+      parts.exploration_episodes = explorationEpisodes();
+      parts.adapt = [&networks = learner->networks(),
+                     context = settings.context](const Model& policy) {
+        return std::make_unique<LatentAdaptation>(networks, context, policy.floats().data());
+      };
+    }
+    parts.learner = std::move(learner);
+    parts.evaluation_envs =
+        makeEnvs([&](int) { return task.makeEnv(); }, settings.evaluation_episodes);
+    parts.reset_moments = settings.reset_moments;
+    return parts;
+  }
+
+  std::unique_ptr<PolicyFamily> policies(const Env& env, int num_tasks) const override {
+    return std::make_unique<SacPolicies>(env.spec(), settings_, num_tasks);
+  }
+
+  // of z the prior's mean
+  std::optional<std::vector<float>> metaInput(int task, int num_tasks) const override {
+    if (infers()) return std::vector<float>(settings_.context.latent_size);
+    if (!isTold()) return std::vector<float>();
+    if (task < 0 || task >= num_tasks) return std::nullopt;
+    return oneHot(task, num_tasks);
+  }
+
+ private:
+  bool infers() const { return settings_.task_encoding == "inference"; }
+  bool isTold() const { return settings_.task_encoding == "one_hot"; }
+
+  SacSettings settings_;
+};
+
+const RegisteredLearner<SacKind> kSac("sac", "for networks with continuous actions",
+                                      "actor_critic");
+
+}  // namespace
+}  // namespace pmeta
