@@ -9,6 +9,8 @@ using visualization_msgs::MarkerArray;
 
 namespace {
 
+const RegisteredScene<CartPoleScene, pmeta::CartPoleFamily> kCartPole("cart_pole");
+
 constexpr std::size_t kObservation = 4;  // position, velocity, angle, angular velocity
 constexpr double kHalfTrack = 2.6;       // m, of which kPositionLimit may be used
 constexpr double kCartWidth = 0.46;
@@ -62,9 +64,9 @@ void drawTrace(Figure& figure, const Trajectory& episode, double scale, const Co
 
 }  // namespace
 
-CartPoleScene::CartPoleScene(const pmeta::CartPoleFamily& family)
+CartPoleScene::CartPoleScene(const pmeta::CartPoleFamily& family, int num_tasks)
     : family_(family),
-      cards_(layoutCards(family.numTasks(), family.numTasks(), 2, 2 * kHalfTrack,
+      cards_(layoutCards(num_tasks, family.numTasks(), 2, 2 * kHalfTrack,
                          kTrace + kCartHeight + longestPole(family) + kAir)) {}
 
 std::vector<geometry_msgs::TransformStamped> CartPoleScene::frames() const {

@@ -17,7 +17,7 @@ class CartPoleScene : public Scene {
   static constexpr double kCartHeight = 0.24;    ///< m; the pole turns about the middle of its top
   static constexpr double kLongestPole = 3;      ///< m
 
-  explicit CartPoleScene(const pmeta::CartPoleFamily& family);
+  CartPoleScene(const pmeta::CartPoleFamily& family, int num_tasks);
 
   std::vector<geometry_msgs::TransformStamped> frames() const override;
   std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;

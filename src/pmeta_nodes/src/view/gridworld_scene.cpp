@@ -11,6 +11,8 @@
 namespace pmeta_nodes {
 namespace {
 
+const RegisteredScene<GridworldScene, pmeta::GridworldFamily> kGridworld("gridworld");
+
 using pmeta_msgs::Trajectory;
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
@@ -408,8 +410,8 @@ MarkerArray gridworldScene(const std::vector<GridGeometry>& grids, const SceneCo
   return scene;
 }
 
-GridworldScene::GridworldScene(const pmeta::GridworldFamily& family) {
-  for (int task = 0; task < family.numTasks(); ++task) {
+GridworldScene::GridworldScene(const pmeta::GridworldFamily& family, int num_tasks) {
+  for (int task = 0; task < num_tasks; ++task) {
     grids_.push_back({family.task(task), family.stride(), family.taskName(task)});
   }
 }

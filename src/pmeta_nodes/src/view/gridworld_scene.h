@@ -33,7 +33,7 @@ visualization_msgs::MarkerArray gridworldScene(const std::vector<GridGeometry>& 
 /// The gridworlds: cells coloured by value, greedy actions and the paths of both policies.
 class GridworldScene : public Scene {
  public:
-  explicit GridworldScene(const pmeta::GridworldFamily& family);
+  GridworldScene(const pmeta::GridworldFamily& family, int num_tasks);
 
   std::vector<geometry_msgs::TransformStamped> frames() const override;
   std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;

@@ -9,6 +9,8 @@ using visualization_msgs::MarkerArray;
 
 namespace {
 
+const RegisteredScene<MountainCarScene, pmeta::MountainCarFamily> kMountainCar("mountain_car");
+
 constexpr std::size_t kObservation = 2;  // position, velocity
 constexpr double kLeft = -1.2;
 constexpr double kRight = 0.6;
@@ -87,9 +89,9 @@ double MountainCarScene::height(double zeta, double position) {
   return 0.45 * std::sin(zeta * position) + 0.55;
 }
 
-MountainCarScene::MountainCarScene(const pmeta::MountainCarFamily& family)
+MountainCarScene::MountainCarScene(const pmeta::MountainCarFamily& family, int num_tasks)
     : family_(family),
-      cards_(layoutCards(family.numTasks(), family.numTasks(), 1, kWidth, kSteps + kHeight)) {}
+      cards_(layoutCards(num_tasks, family.numTasks(), 1, kWidth, kSteps + kHeight)) {}
 
 double MountainCarScene::velocityScale() const {
   return kPhaseHeight / 2 / kHighestSpeed * scale();

@@ -16,7 +16,7 @@ class MountainCarScene : public Scene {
   /// s; the environment knows no seconds, this is what Gym draws it with.
   static constexpr double kTimeStep = 1 / 30.0;
 
-  explicit MountainCarScene(const pmeta::MountainCarFamily& family);
+  MountainCarScene(const pmeta::MountainCarFamily& family, int num_tasks);
 
   std::vector<geometry_msgs::TransformStamped> frames() const override;
   std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;

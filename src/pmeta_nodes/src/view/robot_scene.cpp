@@ -5,10 +5,7 @@
 #include <cstdint>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/env/ant.h"
-#include "pmeta_core/env/half_cheetah.h"
 #include "pmeta_core/env/mujoco_env.h"
-#include "pmeta_core/env/walker2d.h"
 
 namespace pmeta_nodes {
 
@@ -289,26 +286,6 @@ std::string RobotScene::speedText(const Moment& moment) const {
   const std::string text = number(along) + " m/s";
   return target.velocity ? text + ", target " + number(*target.velocity)
                          : "x " + number(now.x) + " m, " + text;
-}
-
-std::unique_ptr<Scene> makeRobotScene(const pmeta::EnvFamily& family, int num_tasks) {
-  std::vector<RobotTarget> targets(num_tasks);
-  RobotCamera camera;
-  if (const auto* cheetahs = dynamic_cast<const pmeta::HalfCheetahFamily*>(&family)) {
-    for (int task = 0; task < num_tasks; ++task) {
-      const pmeta::HalfCheetahTask& goal = cheetahs->task(task);
-      targets[task].direction = goal.value < 0 ? kPi : 0;
-      if (goal.goal == pmeta::HalfCheetahTask::Goal::kVelocity) {
-        targets[task].velocity = std::abs(goal.value);
-      }
-    }
-  } else if (const auto* ants = dynamic_cast<const pmeta::AntFwdBackFamily*>(&family)) {
-    for (int task = 0; task < num_tasks; ++task) targets[task].direction = ants->angle(task);
-    camera = {40 * kPi / 180, 3.4, 2.8};
-  } else if (dynamic_cast<const pmeta::Walker2dParamsFamily*>(&family) == nullptr) {
-    return nullptr;
-  }
-  return std::make_unique<RobotScene>(family, std::move(targets), camera);
 }
 
 }  // namespace pmeta_nodes

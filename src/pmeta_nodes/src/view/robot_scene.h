@@ -83,8 +83,4 @@ class RobotScene : public Scene {
   std::map<std::pair<int, int>, Path> paths_;
 };
 
-/// The scene of a family of MuJoCo; null if it is none. Tasks from its numTasks() to `num_tasks`
-/// are test tasks.
-std::unique_ptr<Scene> makeRobotScene(const pmeta::EnvFamily& family, int num_tasks);
-
 }  // namespace pmeta_nodes

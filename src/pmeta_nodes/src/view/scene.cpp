@@ -3,12 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "view/cart_pole_scene.h"
-#include "view/gridworld_scene.h"
-#include "view/mountain_car_scene.h"
-#include "view/robot_scene.h"
-#include "view/sparse_point_scene.h"
-
 namespace pmeta_nodes {
 
 using pmeta_msgs::Trajectory;
@@ -19,21 +13,14 @@ constexpr std::size_t kMostSteps = 100000;
 
 }  // namespace
 
+pmeta::Registry<SceneMaker>& scenes() {
+  static pmeta::Registry<SceneMaker> scenes("scene");
+  return scenes;
+}
+
 std::unique_ptr<Scene> makeScene(const pmeta::Experiment& experiment) {
-  const pmeta::EnvFamily& family = experiment.family();
-  if (const auto* grids = dynamic_cast<const pmeta::GridworldFamily*>(&family)) {
-    return std::make_unique<GridworldScene>(*grids);
-  }
-  if (const auto* carts = dynamic_cast<const pmeta::CartPoleFamily*>(&family)) {
-    return std::make_unique<CartPoleScene>(*carts);
-  }
-  if (const auto* cars = dynamic_cast<const pmeta::MountainCarFamily*>(&family)) {
-    return std::make_unique<MountainCarScene>(*cars);
-  }
-  if (const auto* points = dynamic_cast<const pmeta::SparsePointFamily*>(&family)) {
-    return std::make_unique<SparsePointScene>(*points, experiment.totalTasks());
-  }
-  return makeRobotScene(family, experiment.totalTasks());
+  const SceneMaker* make = scenes().find(experiment.settings().environment);
+  return make == nullptr ? nullptr : (*make)(experiment.family(), experiment.totalTasks());
 }
 
 std::size_t numSteps(const Trajectory& trajectory) { return trajectory.rewards.size(); }

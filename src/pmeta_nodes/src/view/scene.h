@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <pmeta_msgs/Trajectory.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include "pmeta_core/base/registry.h"
 #include "pmeta_core/experiment/experiment.h"
 
 namespace pmeta_nodes {
@@ -68,6 +70,25 @@ class Scene {
                                                  const std::vector<double>& /*seconds*/) {
     return {};
   }
+};
+
+/// Makes the scene of a family, which must outlive it; tasks from its numTasks() to `num_tasks` are
+/// test tasks.
+using SceneMaker =
+    std::function<std::unique_ptr<Scene>(const pmeta::EnvFamily& family, int num_tasks)>;
+
+/// Every scene, by the name of the environment family that it shows.
+pmeta::Registry<SceneMaker>& scenes();
+
+/// In the source of a scene, outside of any function:
+///
+///     const RegisteredScene<CartPoleScene, pmeta::CartPoleFamily> kCartPole("cart_pole");
+template <class Drawn, class Family>
+struct RegisteredScene : pmeta::Registered<SceneMaker> {
+  explicit RegisteredScene(const std::string& environment)
+      : Registered(scenes(), environment, [](const pmeta::EnvFamily& family, int num_tasks) {
+          return std::make_unique<Drawn>(dynamic_cast<const Family&>(family), num_tasks);
+        }) {}
 };
 
 /// The scene of the experiment's environment; null if there is none. The experiment must outlive

@@ -12,6 +12,9 @@ using visualization_msgs::MarkerArray;
 
 namespace {
 
+const RegisteredScene<SparsePointScene, pmeta::SparsePointFamily> kSparsePoint(
+    "sparse_point_robot");
+
 constexpr std::size_t kObservation = 2;  // x, y
 constexpr std::size_t kMostPathPoints = 200;
 constexpr int kMostGoals = 24;  // faint ones on a card

@@ -29,12 +29,17 @@ class Registry {
 
   /// Throws Error if there is none of that name, with the known names and the nearest.
   const Row& at(const std::string& name) const {
-    const auto found = rows_.find(name);
-    if (found != rows_.end()) return found->second;
+    if (const Row* row = find(name)) return *row;
     const std::string guess = nearest(name, names());
     throw Error("unknown " + kind_ + " '" + name + "'" +
                 (guess.empty() ? "." : ": did you mean '" + guess + "'?") + " Known are " +
                 join(names()) + ".");
+  }
+
+  /// Null if there is none of that name.
+  const Row* find(const std::string& name) const {
+    const auto found = rows_.find(name);
+    return found == rows_.end() ? nullptr : &found->second;
   }
 
   /// Ascending.
