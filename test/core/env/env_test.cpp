@@ -103,5 +103,97 @@ TEST(Env, GoesOnFromItsState) {
   }
 }
 
+// a random action within the bounds that the environment tells
+void drawAction(const EnvSpec& spec, Rng& rng, std::vector<double>& action) {
+  for (std::size_t i = 0; i < action.size(); ++i) {
+    const Quantity& one = spec.action[i];
+    action[i] = spec.num_actions > 0 ? static_cast<double>(rng.below(spec.num_actions))
+                                     : one.low + (one.high - one.low) * rng.uniform();
+  }
+}
+
+TEST(EnvSpec, ShippedFamiliesDescribeAllTheirNumbersAndKeepTheBounds) {
+  constexpr double kRounding = 1e-9;
+  for (const std::string& name : envFamilies().names()) {
+    SCOPED_TRACE(name);
+    const auto family = envFamilies().at(name)();
+    family->build(0);
+    for (int task = 0; task < family->numTasks(); task += 3) {
+      const auto env = family->make(task);
+      const EnvSpec& spec = env->spec();
+      ASSERT_EQ(spec.observation.size(), static_cast<std::size_t>(spec.observation_size));
+      ASSERT_EQ(spec.action.size(), static_cast<std::size_t>(spec.action_size));
+      ASSERT_EQ(spec.choices.size(), static_cast<std::size_t>(spec.num_actions));
+      EXPECT_EQ(observationsOf(spec).size(), spec.observation.size());
+      EXPECT_EQ(actionsOf(spec).size(), spec.action.size());
+      EXPECT_EQ(spec.copies, 0);
+      for (const Quantity& one : spec.action) EXPECT_LT(one.high - one.low, 100) << one.name;
+
+      std::vector<double> observation(spec.observation.size()), action(spec.action.size());
+      const auto expectInBounds = [&] {
+        for (std::size_t i = 0; i < observation.size(); ++i) {
+          EXPECT_GE(observation[i], spec.observation[i].low - kRounding)
+              << spec.observation[i].name;
+          EXPECT_LE(observation[i], spec.observation[i].high + kRounding)
+              << spec.observation[i].name;
+        }
+      };
+      Rng rng(7, task, Stream::kMeasure);
+      for (int episode = 0; episode < 5; ++episode) {
+        env->reset(rng, observation.data());
+        Step step;
+        while (!step.terminated && !step.truncated) {
+          expectInBounds();
+          drawAction(spec, rng, action);
+          step = env->step(action.data(), rng, observation.data());
+        }
+        if (!step.terminated) expectInBounds();
+      }
+    }
+  }
+}
+
+TEST(EnvSpec, RestorableIsWhatRestores) {
+  for (const std::string& name : envFamilies().names()) {
+    const auto family = envFamilies().at(name)();
+    family->build(0);
+    const auto env = family->make(0);
+    EXPECT_TRUE(env->spec().restorable) << name;
+    std::vector<double> observation(env->spec().observation.size());
+    Rng rng(1, 0, Stream::kMeasure);
+    env->reset(rng, observation.data());
+    EXPECT_NO_THROW(env->setState(env->state())) << name;
+  }
+  EXPECT_FALSE(Closed().spec().restorable);
+  EXPECT_THROW(Closed().setState({1}), Error);
+}
+
+TEST(EnvSpec, WhatIsNotDescribedIsNumbered) {
+  const EnvSpec discrete{"closed", 2, 1, 3, 10};
+  EXPECT_EQ(observationsOf(discrete).at(1).name, "observation_1");
+  EXPECT_EQ(observationsOf(discrete).at(1).low, -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(actionsOf(discrete).at(0).name, "action_0");
+  EXPECT_EQ(actionsOf(discrete).at(0).high, 2);
+  const EnvSpec continuous{"closed", 2, 2, 0, 10};
+  EXPECT_EQ(actionsOf(continuous).at(1).low, -1);
+  EXPECT_EQ(actionsOf(continuous).at(1).high, 1);
+}
+
+TEST(EnvSpec, HalfADescriptionAndNamesThatAreTakenAreRefused) {
+  EnvSpec spec{"closed", 2, 1, 3, 10};
+  spec.observation = {{"x", "m"}};
+  EXPECT_EQ(errorOf([&] { observationsOf(spec); }),
+            "environment 'closed' describes 1 numbers of its observation, which has 2: describe "
+            "all of them or none.");
+  spec.observation = {{"x", "m"}, {"x", "m"}};
+  EXPECT_EQ(errorOf([&] { observationsOf(spec); }),
+            "environment 'closed' names two numbers of its observation 'x': give each a name of "
+            "its own.");
+  spec.action = {{"to push", ""}};
+  EXPECT_EQ(errorOf([&] { actionsOf(spec); }),
+            "environment 'closed' names a number of its action 'to push': a name has no blanks and "
+            "no commas, and is not empty.");
+}
+
 }  // namespace
 }  // namespace pmeta

@@ -40,8 +40,23 @@ double Ant::reward(double direction, const AntStep& step) {
          step.control_cost - step.contact_cost + step.survive;
 }
 
+std::vector<Quantity> Ant::observed() {
+  const auto vectorOf = [](const std::string& name, const std::string& unit) {
+    return std::vector<Quantity>{{name + "_x", unit}, {name + "_y", unit}, {name + "_z", unit}};
+  };
+  return joined({{{"root_z", "m", kLowest, kHighest},
+                  {"root_quaternion_w", "", -1, 1},
+                  {"root_quaternion_x", "", -1, 1},
+                  {"root_quaternion_y", "", -1, 1},
+                  {"root_quaternion_z", "", -1, 1}},
+                 jointAngles(layout(), 1),
+                 vectorOf("root_velocity", "m/s"),
+                 vectorOf("root_angular_velocity", "rad/s"),
+                 jointVelocities(layout(), 1)});
+}
+
 Ant::Ant(double direction, std::shared_ptr<const MujocoModel> model, int horizon)
-    : MujocoEnv({kName, 27, 8, 0, horizon}, std::move(model), kFrameSkip),
+    : MujocoEnv(kName, layout(), observed(), horizon, std::move(model), kFrameSkip),
       direction_(direction),
       contact_numbers_(6 * simulation_.numBodies()) {}
 

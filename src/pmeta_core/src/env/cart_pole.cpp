@@ -19,11 +19,23 @@ constexpr double kAngleLimit = 12 * 2 * 3.141592653589793 / 360;
 constexpr double kStartSpread = 0.05;
 constexpr int kHorizon = 200;
 
+EnvSpec cartPoleSpec() {
+  EnvSpec spec = describedSpec("cart_pole", kHorizon,
+                               {{"position", "m", -kPositionLimit, kPositionLimit},
+                                {"velocity", "m/s"},
+                                {"angle", "rad", -kAngleLimit, kAngleLimit},
+                                {"angular_velocity", "rad/s"}},
+                               {{"push", "", 0, 1}}, {"left", "right"});
+  spec.step_seconds = kTimeStep;
+  spec.restorable = true;
+  return spec;
+}
+
 }  // namespace
 
 CartPole::CartPole(const CartPoleTask& task)
     : task_(task),
-      spec_{"cart_pole", 4, 1, 2, kHorizon},
+      spec_(cartPoleSpec()),
       total_mass_(task.masspole + kCartMass),
       polemass_length_(task.masspole * task.length) {}
 

@@ -17,10 +17,19 @@ constexpr int kRowStep[kNumMoves] = {-1, 1, 0, 0};  // up, down, left, right
 constexpr int kColumnStep[kNumMoves] = {0, 0, -1, 1};
 constexpr int kHorizonPerSide = 4;
 
+EnvSpec gridworldSpec(int size) {
+  const double last = size - 1;
+  EnvSpec spec = describedSpec("gridworld", kHorizonPerSide * size,
+                               {{"row", "cells", 0, last}, {"column", "cells", 0, last}},
+                               {{"move", "", 0, kNumMoves - 1}}, {"up", "down", "left", "right"});
+  spec.restorable = true;
+  return spec;
+}
+
 }  // namespace
 
-Gridworld::Gridworld(const GridworldTask& task, int stride) : task_(task), stride_(stride) {
-  spec_ = {"gridworld", 2, 1, kNumMoves, kHorizonPerSide * task.size};
+Gridworld::Gridworld(const GridworldTask& task, int stride)
+    : task_(task), stride_(stride), spec_(gridworldSpec(task.size)) {
   outcomes_.resize(static_cast<std::size_t>(numStates()) * kNumMoves);
   for (int row = 0; row < task.size; ++row) {
     for (int column = 0; column < task.size; ++column) {

@@ -24,6 +24,14 @@ const char* nameOf(HalfCheetahTask::Goal goal) {
 
 }  // namespace
 
+std::vector<Quantity> HalfCheetah::observed() {
+  return joined({{{"root_z", "m"}, {"root_pitch", "rad"}},
+                 jointAngles(layout(), 3),
+                 {{"root_x_velocity", "m/s"}, {"root_z_velocity", "m/s"}},
+                 jointVelocities(layout(), 2),
+                 {{"torso_x", "m"}, {"torso_y", "m"}, {"torso_z", "m"}}});
+}
+
 const MujocoLayout& HalfCheetah::layout() {
   static const MujocoLayout kLayout = {
       "half_cheetah",
@@ -44,7 +52,7 @@ double HalfCheetah::reward(const HalfCheetahTask& task, double forward_velocity,
 
 HalfCheetah::HalfCheetah(const HalfCheetahTask& task, std::shared_ptr<const MujocoModel> model,
                          int horizon)
-    : MujocoEnv({nameOf(task.goal), 20, 6, 0, horizon}, std::move(model), kFrameSkip),
+    : MujocoEnv(nameOf(task.goal), layout(), observed(), horizon, std::move(model), kFrameSkip),
       task_(task) {}
 
 void HalfCheetah::drawStart(Rng& rng, double* qpos, double* qvel) {

@@ -18,10 +18,21 @@ constexpr double kStartLow = -0.6;
 constexpr double kStartHigh = -0.4;
 constexpr int kHorizon = 200;
 
+EnvSpec mountainCarSpec(double velocity_scale) {
+  const double speed = velocity_scale * kHighestSpeed;
+  const Quantity velocity = velocity_scale == 1 ? Quantity{"velocity", "1/step", -speed, speed}
+                                                : Quantity{"scaled_velocity", "", -speed, speed};
+  EnvSpec spec = describedSpec("mountain_car", kHorizon,
+                               {{"position", "", kLowestPosition, kHighestPosition}, velocity},
+                               {{"push", "", 0, 2}}, {"left", "none", "right"});
+  spec.restorable = true;
+  return spec;
+}
+
 }  // namespace
 
 MountainCar::MountainCar(const MountainCarTask& task, double velocity_scale)
-    : task_(task), velocity_scale_(velocity_scale), spec_{"mountain_car", 2, 1, 3, kHorizon} {}
+    : task_(task), velocity_scale_(velocity_scale), spec_(mountainCarSpec(velocity_scale)) {}
 
 void MountainCar::reset(Rng& rng, double* observation) {
   position_ = kStartLow + (kStartHigh - kStartLow) * rng.uniform();

@@ -5,12 +5,48 @@
 #include "pmeta_core/env/model_files.h"
 
 namespace pmeta {
+namespace {
 
-MujocoEnv::MujocoEnv(const EnvSpec& spec, std::shared_ptr<const MujocoModel> model, int frame_skip)
-    : simulation_(std::move(model), spec.name, frame_skip),
-      spec_(spec),
+// shares of the motors' torques
+std::vector<Quantity> motors(const MujocoLayout& layout) {
+  std::vector<Quantity> quantities;
+  for (const std::string& motor : layout.motors) quantities.push_back({motor, "", -1, 1});
+  return quantities;
+}
+
+}  // namespace
+
+MujocoEnv::MujocoEnv(const std::string& name, const MujocoLayout& layout,
+                     std::vector<Quantity> observation, int horizon,
+                     std::shared_ptr<const MujocoModel> model, int frame_skip)
+    : simulation_(std::move(model), name, frame_skip),
+      spec_(describedSpec(name, horizon, std::move(observation), motors(layout))),
       torso_body_(simulation_.model().body("torso")) {
+  spec_.step_seconds = simulation_.dt();
+  spec_.restorable = true;
   torso_ = simulation_.bodyPosition(torso_body_);
+}
+
+std::vector<Quantity> MujocoEnv::jointAngles(const MujocoLayout& layout, std::size_t first) {
+  std::vector<Quantity> quantities;
+  for (std::size_t i = first; i < layout.joints.size(); ++i) {
+    quantities.push_back({layout.joints[i], "rad"});
+  }
+  return quantities;
+}
+
+std::vector<Quantity> MujocoEnv::jointVelocities(const MujocoLayout& layout, std::size_t first) {
+  std::vector<Quantity> quantities;
+  for (std::size_t i = first; i < layout.joints.size(); ++i) {
+    quantities.push_back({layout.joints[i] + "_velocity", "rad/s"});
+  }
+  return quantities;
+}
+
+std::vector<Quantity> MujocoEnv::joined(const std::vector<std::vector<Quantity>>& parts) {
+  std::vector<Quantity> all;
+  for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
 }
 
 void MujocoEnv::reset(Rng& rng, double* observation) {

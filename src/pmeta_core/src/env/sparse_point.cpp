@@ -25,10 +25,19 @@ std::vector<double> evenAngles(int count) {
   return angles;
 }
 
+EnvSpec sparsePointSpec(int horizon) {
+  const double farthest = kLongestMove * horizon;
+  EnvSpec spec = describedSpec(kName, horizon,
+                               {{"x", "", -farthest, farthest}, {"y", "", -farthest, farthest}},
+                               {{"move_x", "", -1, 1}, {"move_y", "", -1, 1}});
+  spec.restorable = true;
+  return spec;
+}
+
 }  // namespace
 
 SparsePoint::SparsePoint(const SparsePointTask& task, double goal_radius, int horizon)
-    : task_(task), goal_radius_(goal_radius), spec_{kName, 2, 2, 0, horizon} {}
+    : task_(task), goal_radius_(goal_radius), spec_(sparsePointSpec(horizon)) {}
 
 void SparsePoint::reset(Rng&, double* observation) {
   x_ = 0;

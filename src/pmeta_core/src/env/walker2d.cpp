@@ -31,8 +31,20 @@ const MujocoLayout& Walker2d::layout() {
   return kLayout;
 }
 
+std::vector<Quantity> Walker2d::observed() {
+  std::vector<Quantity> velocities = joined(
+      {{{"root_x_velocity", "m/s"}, {"root_z_velocity", "m/s"}}, jointVelocities(layout(), 2)});
+  for (Quantity& one : velocities) {
+    one.low = -kHighestSpeed;
+    one.high = kHighestSpeed;
+  }
+  return joined({{{"root_z", "m", kLowest, kHighest}, {"root_pitch", "rad", -kSteepest, kSteepest}},
+                 jointAngles(layout(), 3),
+                 velocities});
+}
+
 Walker2d::Walker2d(std::shared_ptr<const MujocoModel> model, int horizon)
-    : MujocoEnv({kName, 17, 6, 0, horizon}, std::move(model), kFrameSkip) {}
+    : MujocoEnv(kName, layout(), observed(), horizon, std::move(model), kFrameSkip) {}
 
 void Walker2d::drawStart(Rng& rng, double* qpos, double* qvel) {
   for (int i = 0; i < simulation_.nq(); ++i) qpos[i] += kStartSpread * (2 * rng.uniform() - 1);

@@ -51,6 +51,7 @@ class Ant : public MujocoEnv {
   Step afterStep() override;
   void observe(double* observation) const override;
   double contactCost() const;
+  static std::vector<Quantity> observed();
 
   double direction_;
   int contact_numbers_;  ///< how many there are, of all bodies

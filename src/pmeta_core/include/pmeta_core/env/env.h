@@ -11,17 +11,9 @@
 #include "pmeta_core/base/rng.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/base/state.h"
+#include "pmeta_core/env/env_spec.h"
 
 namespace pmeta {
-
-/// What an agent must know of an environment before it acts.
-struct EnvSpec {
-  std::string name;          ///< family name, e.g. "gridworld"
-  int observation_size = 0;  ///< length of an observation vector
-  int action_size = 0;       ///< length of an action vector; 1 where actions are discrete
-  int num_actions = 0;       ///< number of discrete actions; 0 where they are continuous
-  int horizon = 0;           ///< steps after which an episode is truncated
-};
 
 /// What one step gives besides the next observation.
 struct Step {
@@ -65,13 +57,14 @@ class Env {
   virtual Step step(const double* action, Rng& rng, double* observation) = 0;
 
   /// All that the next step depends on, for checkpoints and recorded trajectories; the last number
-  /// is the count of steps since the reset. Throws Error where an environment does not offer it.
+  /// is the count of steps since the reset. Throws Error unless spec().restorable.
   virtual std::vector<double> state() const;
 
   /// Generalised positions of the mechanism, for drawings; empty where the observation says all.
   virtual std::vector<double> configuration() const { return {}; }
 
-  /// Goes on from a state() of the same task. Throws Error if `state` cannot be one.
+  /// Goes on from a state() of the same task. Throws Error if `state` cannot be one, or unless
+  /// spec().restorable.
   virtual void setState(const std::vector<double>& state);
 
   /// state() and setState(); loading refuses an episode that is over.

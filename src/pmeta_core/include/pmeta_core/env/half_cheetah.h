@@ -50,6 +50,7 @@ class HalfCheetah : public MujocoEnv {
   void beforeStep() override;
   Step afterStep() override;
   void observe(double* observation) const override;
+  static std::vector<Quantity> observed();
 
   HalfCheetahTask task_;
   double x_before_ = 0;

@@ -26,7 +26,16 @@ class MujocoEnv : public Env {
   const MujocoSimulation& simulation() const { return simulation_; }
 
  protected:
-  MujocoEnv(const EnvSpec& spec, std::shared_ptr<const MujocoModel> model, int frame_skip);
+  /// Actions are the motors of `layout`; what is observed is described by `observation`.
+  MujocoEnv(const std::string& name, const MujocoLayout& layout, std::vector<Quantity> observation,
+            int horizon, std::shared_ptr<const MujocoModel> model, int frame_skip);
+
+  /// The layout's hinges from number `first` on, and how fast they turn.
+  static std::vector<Quantity> jointAngles(const MujocoLayout& layout, std::size_t first);
+  static std::vector<Quantity> jointVelocities(const MujocoLayout& layout, std::size_t first);
+
+  /// All parts, one after the other.
+  static std::vector<Quantity> joined(const std::vector<std::vector<Quantity>>& parts);
 
   /// The sum of the squares of the last step's control.
   double squaredControl() const;

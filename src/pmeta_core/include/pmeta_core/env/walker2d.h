@@ -57,6 +57,7 @@ class Walker2d : public MujocoEnv {
   void beforeStep() override;
   Step afterStep() override;
   void observe(double* observation) const override;
+  static std::vector<Quantity> observed();
 
   double x_before_ = 0;
   double forward_velocity_ = 0;
