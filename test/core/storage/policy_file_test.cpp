@@ -274,5 +274,26 @@ TEST_F(PolicyFileTest, ARunLeavesItsPoliciesInItsFolder) {
   }
 }
 
+TEST_F(PolicyFileTest, SaysWhatItsNumbersAreAndHowLongAStepTakes) {
+  const auto grid = policyMetadata(gridExperiment({"sizes:=[4, 5]"}), PolicyKind::kPersonal, 1, 3);
+  const Json rows = {{"name", "row"}, {"unit", "cells"}, {"low", 0}, {"high", 4}};
+  EXPECT_EQ(Json::parse(grid.at("observation")).at(0), rows);
+  EXPECT_EQ(Json::parse(grid.at("action")).at(0).at("high"), 3);
+  EXPECT_EQ(Json::parse(grid.at("choices")), (Json{"up", "down", "left", "right"}));
+  EXPECT_EQ(grid.count("step_seconds"), 0u) << "a grid knows no time";
+
+  const Experiment cheetahs = Experiment::parse(
+      "environment: {name: half_cheetah_dir}\nlearner: sac\nsac: {task_encoding: one_hot}", "test");
+  const auto robot = policyMetadata(cheetahs, PolicyKind::kMeta, 0, 3);
+  const Json observation = Json::parse(robot.at("observation"));
+  ASSERT_EQ(observation.size(), 20u);
+  const Json height = {{"name", "root_z"}, {"unit", "m"}, {"low", nullptr}, {"high", nullptr}};
+  EXPECT_EQ(observation.at(0), height);
+  const Json motor = {{"name", "bthigh"}, {"unit", ""}, {"low", -1}, {"high", 1}};
+  EXPECT_EQ(Json::parse(robot.at("action")).at(0), motor);
+  EXPECT_EQ(robot.count("choices"), 0u);
+  EXPECT_EQ(robot.at("step_seconds"), "0.05");
+}
+
 }  // namespace
 }  // namespace pmeta

@@ -1,6 +1,7 @@
 #include "pmeta_core/storage/policy_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -192,6 +193,20 @@ class TensorReader {
   std::map<std::string, Tensor> tensors_;
 };
 
+// null where there is no bound: JSON has no infinity
+Json boundOf(double bound) { return std::isfinite(bound) ? Json(bound) : Json(); }
+
+std::string describe(const std::vector<Quantity>& quantities) {
+  Json list = Json::array();
+  for (const Quantity& one : quantities) {
+    list.push_back({{"name", one.name},
+                    {"unit", one.unit},
+                    {"low", boundOf(one.low)},
+                    {"high", boundOf(one.high)}});
+  }
+  return list.dump();
+}
+
 ModelLayout parseLayout(const std::string& path, const std::string& text) {
   try {
     return ModelLayout::parse(text);
@@ -290,7 +305,11 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment, 
       {"run_id", settings.run_id},
       {"observation_size", std::to_string(spec.observation_size)},
       {"num_actions", std::to_string(spec.num_actions)},
+      {"observation", describe(observationsOf(spec))},
+      {"action", describe(actionsOf(spec))},
       {"settings", experiment.runYaml()}};
+  if (!spec.choices.empty()) metadata["choices"] = Json(spec.choices).dump();
+  if (spec.step_seconds > 0) metadata["step_seconds"] = formatNumber(spec.step_seconds);
   if (const ModelChoice* model = experiment.model()) {
     metadata["model_hash"] = model->hash;
     if (!model->file.empty()) metadata["model_file"] = model->file;
