@@ -6,6 +6,7 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/env/half_cheetah.h"
+#include "pmeta_core/env/mujoco_env.h"
 #include "scene_support.h"
 
 namespace pmeta_nodes {
@@ -239,6 +240,64 @@ TEST(RobotScene, WalkersHaveCapsOfEachRadius) {
   const double scale = dynamic_cast<const RobotScene&>(*scene).scale();
   EXPECT_NEAR(1.25 * scale, find(markers, "geoms", 0).pose.position.z, 1e-12);
   EXPECT_NE(std::string::npos, find(markers, "steps", 0).text.find("fell at step 1"));
+}
+
+/// A cart of the size of a hand, which no scene knows.
+class Cart : public pmeta::MujocoEnv {
+ public:
+  Cart() : MujocoEnv("cart", layout(), {{"x", "m"}}, 20, cart(), 1) {}
+
+ private:
+  static pmeta::MujocoLayout layout() { return {"cart", 1, 1, {"torso"}, {"rail"}, {"motor"}}; }
+  static std::shared_ptr<const pmeta::MujocoModel> cart() {
+    return std::make_shared<pmeta::MujocoModel>(pmeta::MujocoModel::parse(
+        "<mujoco><worldbody><body name='torso' pos='0 0 0.02'><joint name='rail' type='slide' "
+        "axis='1 0 0'/><geom type='box' size='0.05 0.03 0.02'/></body></worldbody><actuator>"
+        "<motor name='motor' joint='rail' ctrllimited='true' ctrlrange='-1 "
+        "1'/></actuator></mujoco>",
+        "cart"));
+  }
+  void drawStart(pmeta::Rng&, double*, double*) override {}
+  void beforeStep() override {}
+  pmeta::Step afterStep() override { return {}; }
+  void observe(double* observation) const override { *observation = simulation_.qpos()[0]; }
+};
+
+class CartFamily : public pmeta::EnvFamily {
+ public:
+  void bind(pmeta::Settings&) override {}
+  void build(std::uint64_t) override {}
+  int numTasks() const override { return 1; }
+  std::string taskName(int) const override { return "cart_0"; }
+  std::string taskDescription(int) const override { return "a cart"; }
+  std::unique_ptr<pmeta::Env> make(int) const override { return std::make_unique<Cart>(); }
+};
+
+const pmeta::RegisteredFamily<CartFamily> kCart("cart");
+
+TEST(RobotScene, AModelWithoutARowIsDrawnFromItsGeomsAndGoesNowhere) {
+  const pmeta::Experiment carts = experiment("environment: {name: cart}\nlearner: sac");
+  const auto scene = makeScene(carts);
+  const auto* robots = dynamic_cast<const RobotScene*>(scene.get());
+  ASSERT_NE(nullptr, robots);
+  SceneContent content = contentOf(1);
+  content.tasks[0].meta.episode =
+      shared(episodeOfPositions(0, Trajectory::META, {{0.0}, {0.1}, {0.2}}));
+  EXPECT_DOUBLE_EQ(0.002, scene->stepSeconds());
+  const MarkerArray still = scene->still(content);
+  const MarkerArray moving = scene->moving(content, {1.0});
+  EXPECT_EQ("", complaint(*scene, still));
+  EXPECT_EQ("", complaint(*scene, moving));
+  EXPECT_NEAR(2 * 0.05 * robots->scale(), find(moving, "geoms", 1).scale.x, 1e-9);
+  EXPECT_GT(find(moving, "geoms", 1).scale.x, 0.5) << "as large as others";
+  EXPECT_EQ("x 0.20 m, 50.00 m/s", find(moving, "steps", 1).text);
+  EXPECT_THROW(find(still, "targets", 1), std::out_of_range);
+  bool spaced = false;
+  for (const Marker& marker : still.markers) {
+    EXPECT_EQ(std::string::npos, marker.text.find("to go"));
+    spaced = spaced || marker.text == "every 0.1 m";
+  }
+  EXPECT_TRUE(spaced);
 }
 
 }  // namespace

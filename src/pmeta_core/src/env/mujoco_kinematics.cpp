@@ -3,40 +3,67 @@
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "pmeta_core/base/error.h"
 
 namespace pmeta {
 namespace {
 
-GeomShape shapeOf(const mjModel* model, const std::string& source, int geom) {
-  GeomShape shape;
-  const char* name = mj_id2name(model, mjOBJ_GEOM, geom);
-  if (name != nullptr) shape.name = name;
-  switch (model->geom_type[geom]) {
+// geoms of MuJoCo that are drawn as themselves
+std::optional<GeomShape::Type> typeOf(int type) {
+  switch (type) {
     case mjGEOM_SPHERE:
-      shape.type = GeomShape::Type::kSphere;
-      break;
+      return GeomShape::Type::kSphere;
     case mjGEOM_CAPSULE:
-      shape.type = GeomShape::Type::kCapsule;
-      break;
+      return GeomShape::Type::kCapsule;
     case mjGEOM_ELLIPSOID:
-      shape.type = GeomShape::Type::kEllipsoid;
-      break;
+      return GeomShape::Type::kEllipsoid;
     case mjGEOM_CYLINDER:
-      shape.type = GeomShape::Type::kCylinder;
-      break;
+      return GeomShape::Type::kCylinder;
     case mjGEOM_BOX:
-      shape.type = GeomShape::Type::kBox;
-      break;
+      return GeomShape::Type::kBox;
     default:
-      throw Error("the geom '" + shape.name + "' (number " + std::to_string(geom) +
-                  ") of the model " + source +
-                  " cannot be drawn: use spheres, capsules, ellipsoids, cylinders and boxes.");
+      return std::nullopt;
   }
-  std::copy_n(model->geom_size + 3 * geom, 3, shape.size.begin());
-  const int material = model->geom_matid[geom];
-  const float* rgba = material < 0 ? model->geom_rgba + 4 * geom : model->mat_rgba + 4 * material;
+}
+
+bool hasShapes(const mjModel* m, int body) {
+  for (int i = 0; i < m->body_geomnum[body]; ++i) {
+    if (typeOf(m->geom_type[m->body_geomadr[body] + i])) return true;
+  }
+  return false;
+}
+
+// half sides of the box around a mesh, whose vertices are as the geom's frame has them
+std::array<double, 3> boxAround(const mjModel* m, int mesh) {
+  std::array<double, 3> low{}, high{};
+  for (int i = 0; i < m->mesh_vertnum[mesh]; ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double x = m->mesh_vert[3 * (m->mesh_vertadr[mesh] + i) + axis];
+      low[axis] = std::min(low[axis], x);
+      high[axis] = std::max(high[axis], x);
+    }
+  }
+  return {(high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2};
+}
+
+std::optional<GeomShape> shapeOf(const mjModel* m, int geom) {
+  const int body = m->geom_bodyid[geom];
+  const auto type = typeOf(m->geom_type[geom]);
+  const bool mesh = m->geom_type[geom] == mjGEOM_MESH && !hasShapes(m, body);
+  if (body == 0 || !(type || mesh)) return std::nullopt;
+  GeomShape shape;
+  shape.type = type.value_or(GeomShape::Type::kBox);
+  const char* name = mj_id2name(m, mjOBJ_GEOM, geom);
+  if (name != nullptr) shape.name = name;
+  if (mesh) {
+    shape.size = boxAround(m, m->geom_dataid[geom]);
+  } else {
+    std::copy_n(m->geom_size + 3 * geom, 3, shape.size.begin());
+  }
+  const int material = m->geom_matid[geom];
+  const float* rgba = material < 0 ? m->geom_rgba + 4 * geom : m->mat_rgba + 4 * material;
   std::copy_n(rgba, 3, shape.rgb.begin());
   return shape;
 }
@@ -50,8 +77,9 @@ MujocoKinematics::MujocoKinematics(const MujocoModel& model)
   if (data_ == nullptr) throw Error("MuJoCo cannot pose the model " + model_.source() + ".");
   const mjModel* m = model_.get();
   for (int geom = 0; geom < m->ngeom; ++geom) {
-    if (m->geom_bodyid[geom] == 0) continue;
-    shapes_.push_back(shapeOf(m, model_.source(), geom));
+    std::optional<GeomShape> shape = shapeOf(m, geom);
+    if (!shape) continue;
+    shapes_.push_back(std::move(*shape));
     geoms_.push_back(static_cast<std::size_t>(geom));
   }
   pose(m->qpos0);

@@ -8,7 +8,7 @@ namespace {
 class AntScene : public RobotScene {
  public:
   AntScene(const pmeta::AntFwdBackFamily& family, int num_tasks)
-      : RobotScene(family, targetsOf(family, num_tasks), {40 * kPi / 180, 3.4, 2.8}) {}
+      : RobotScene(family, num_tasks, targetsOf(family, num_tasks)) {}
 
  private:
   static std::vector<RobotTarget> targetsOf(const pmeta::AntFwdBackFamily& family, int num_tasks) {

@@ -10,7 +10,7 @@ namespace {
 class HalfCheetahScene : public RobotScene {
  public:
   HalfCheetahScene(const pmeta::HalfCheetahFamily& family, int num_tasks)
-      : RobotScene(family, targetsOf(family, num_tasks), {}) {}
+      : RobotScene(family, num_tasks, targetsOf(family, num_tasks)) {}
 
  private:
   static std::vector<RobotTarget> targetsOf(const pmeta::HalfCheetahFamily& family, int num_tasks) {

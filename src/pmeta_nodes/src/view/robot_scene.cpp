@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/env/mujoco_env.h"
 
 namespace pmeta_nodes {
 
@@ -15,9 +14,13 @@ using visualization_msgs::MarkerArray;
 
 namespace {
 
-constexpr double kFloorDepth = 0.3;  // m of the lane below the floor of planar robots: its scale
-constexpr double kAir = 0.35;        // m above the highest point at rest
-constexpr double kLegRoom = 0.55;    // m above the floor that is seen from above
+// m, for a robot of the size of those that are shipped
+constexpr double kUsualWidth = 2.6;  // of the view
+constexpr double kUsualWidthFromAbove = 3.4;
+constexpr double kFloorDepth = 0.3;   // of the lane below the floor of planar robots: its scale
+constexpr double kAir = 0.35;         // above the highest point at rest
+constexpr double kLegRoom = 0.55;     // above the floor that is seen from above
+constexpr double kFewestLines = 1.3;  // across the view
 constexpr std::size_t kMostPathPoints = 200;
 constexpr double kFarthest = 1e10;  // m or rad: as far as MujocoSimulation lets a state go
 
@@ -31,36 +34,35 @@ const Color kTick = rgb(0xa9b0bc);
 const Color kFloorLine = rgb(0x555b66);
 const Color kTarget = rgb(0xe08a00);
 
-// the whole metres within `half` of `center`, which is no further away than kFarthest
-std::vector<double> wholeMetres(double center, double half) {
-  std::vector<double> metres;
-  const auto first = static_cast<std::int64_t>(std::ceil(center - half));
-  const auto last = static_cast<std::int64_t>(std::floor(center + half));
-  for (std::int64_t metre = first; metre <= last; ++metre) {
-    metres.push_back(static_cast<double>(metre));
+// the multiples of `spacing` within `half` of `center`, which is no further away than kFarthest
+std::vector<double> linesAround(double center, double half, double spacing) {
+  std::vector<double> lines;
+  const auto first = static_cast<std::int64_t>(std::ceil((center - half) / spacing));
+  const auto last = static_cast<std::int64_t>(std::floor((center + half) / spacing));
+  for (std::int64_t line = first; line <= last; ++line) {
+    lines.push_back(static_cast<double>(line) * spacing);
   }
-  return metres;
+  return lines;
 }
 
 std::string robotFrame(int task, int policy) { return policyFrame(task, policy) + "/robot"; }
 
 }  // namespace
 
-RobotScene::RobotScene(const pmeta::EnvFamily& family, std::vector<RobotTarget> targets,
-                       const RobotCamera& camera)
-    : family_(family), targets_(std::move(targets)), camera_(camera) {
+RobotScene::RobotScene(const pmeta::EnvFamily& family, int num_tasks,
+                       std::vector<RobotTarget> targets)
+    : family_(family), targets_(std::move(targets)) {
   const auto env = family.make(0);
-  const auto* robot = dynamic_cast<const pmeta::MujocoEnv*>(env.get());
-  if (robot == nullptr) throw pmeta::Error("a scene of robots needs environments of MuJoCo.");
-  const pmeta::MujocoModel& model = robot->simulation().model();
-  kinematics_ = std::make_unique<pmeta::MujocoKinematics>(model);
-  step_seconds_ = robot->simulation().dt();
-  torso_ = model.body("torso");
+  if (env->model() == nullptr) throw pmeta::Error("a scene of robots needs a model of MuJoCo.");
+  view_ = pmeta::viewOf(*env->model());
+  kinematics_ = std::make_unique<pmeta::MujocoKinematics>(*env->model());
+  step_seconds_ = env->spec().step_seconds;
   rest_height_ = topOf(*kinematics_);
-  const double height = isPlanar() ? kFloorDepth + rest_height_ + kAir
-                                   : camera_.view_depth * std::sin(camera_.elevation) + kLegRoom;
-  cards_ = layoutCards(static_cast<int>(targets_.size()), family.numTasks(), 2, camera_.view_width,
-                       height);
+  size_ = view_.width / (isPlanar() ? kUsualWidth : kUsualWidthFromAbove);
+  spacing_ = std::pow(10, std::floor(std::log10(view_.width / kFewestLines)));
+  const double height = isPlanar() ? (kFloorDepth + kAir) * size_ + rest_height_
+                                   : view_.depth * std::sin(view_.elevation) + kLegRoom * size_;
+  cards_ = layoutCards(num_tasks, family.numTasks(), 2, view_.width, height);
 }
 
 std::vector<geometry_msgs::TransformStamped> RobotScene::frames() const {
@@ -68,11 +70,11 @@ std::vector<geometry_msgs::TransformStamped> RobotScene::frames() const {
   for (int task = 0; task < cards_.num_tasks; ++task) {
     for (const int policy : policiesOf(cards_, task)) {
       Point floor = cards_.laneBottom(task, policy);
-      floor.y += scale() *
-                 (isPlanar() ? kFloorDepth : camera_.view_depth / 2 * std::sin(camera_.elevation));
+      floor.y +=
+          isPlanar() ? kFloorDepth * unit() : scale() * view_.depth / 2 * std::sin(view_.elevation);
       frames.push_back(shiftedFrame(taskFrame(task), policyFrame(task, policy), floor));
       // seen from -y, and from above by the elevation
-      const double angle = camera_.elevation - kPi / 2;
+      const double angle = view_.elevation - kPi / 2;
       auto robot = shiftedFrame(policyFrame(task, policy), robotFrame(task, policy), {});
       robot.transform.translation.z = kRobotLayer;
       robot.transform.rotation.x = std::sin(angle / 2);
@@ -113,7 +115,7 @@ const std::vector<Position>& RobotScene::pathOf(int task, int policy,
   path.torso.clear();
   for (std::size_t step = 0; episode && step <= numSteps(*episode); ++step) {
     kinematics_->pose(&episode->positions[step * episode->position_size]);
-    const double* at = kinematics_->bodyPosition(torso_);
+    const double* at = kinematics_->bodyPosition(view_.body);
     path.torso.push_back({at[0], at[1], at[2]});
   }
   return path.torso;
@@ -124,41 +126,51 @@ MarkerArray RobotScene::still(const SceneContent& content) const {
   drawTitle(content, scene);
   drawCards(cards_, family_, content, scene);
   for (int task = 0; task < cards_.num_tasks; ++task) {
+    if (targets_.empty()) continue;
     for (const int policy : policiesOf(cards_, task)) drawTarget(task, policy, scene);
   }
-  drawLegend({{[](Figure& figure, const Point& at) { figure.arrow(at, 0.26, 0, kTarget); },
-               "where it is to go"},
-              {[](Figure& figure, const Point& at) {
-                 figure.polyline({{at.x - 0.12, at.y - 0.03},
-                                  {at.x - 0.04, at.y + 0.05},
-                                  {at.x + 0.04, at.y - 0.05},
-                                  {at.x + 0.12, at.y + 0.03}},
-                                 0.035, kFaint);
-               },
-               "where the torso was"},
-              {[](Figure& figure, const Point& at) {
-                 figure.segment({at.x, at.y - 0.1}, {at.x, at.y + 0.1}, 0.03, kTick);
-               },
-               "every metre"}},
-             scene);
+  drawLegend(legend(), scene);
   return scene;
+}
+
+std::vector<LegendEntry> RobotScene::legend() const {
+  std::vector<LegendEntry> entries;
+  if (!targets_.empty()) {
+    entries.push_back({[](Figure& figure, const Point& at) { figure.arrow(at, 0.26, 0, kTarget); },
+                       "where it is to go"});
+  }
+  entries.push_back({[](Figure& figure, const Point& at) {
+                       figure.polyline({{at.x - 0.12, at.y - 0.03},
+                                        {at.x - 0.04, at.y + 0.05},
+                                        {at.x + 0.04, at.y - 0.05},
+                                        {at.x + 0.12, at.y + 0.03}},
+                                       0.035, kFaint);
+                     },
+                     "where it was"});
+  entries.push_back(
+      {[](Figure& figure, const Point& at) {
+         figure.segment({at.x, at.y - 0.1}, {at.x, at.y + 0.1}, 0.03, kTick);
+       },
+       spacing_ == 1 ? "every metre" : "every " + pmeta::formatNumber(spacing_) + " m"});
+  return entries;
 }
 
 /// An arrow: above the heads of planar robots, on the floor of the others.
 void RobotScene::drawTarget(int task, int policy, MarkerArray& scene) const {
   const RobotTarget& target = targets_.at(task);
-  const double length = 0.5 * scale();
+  const double length = 0.5 * unit();
   if (isPlanar()) {
     Figure figure(policyFrame(task, policy), "targets", policyId(task, policy), kTargetLayer);
     const bool forward = std::cos(target.direction) > 0;
     const double x = (forward ? 1 : -1) * (cards_.lane_width / 2 - 0.6 * length);
-    figure.arrow({x, (rest_height_ + 0.55 * kAir) * scale()}, length, forward ? 0 : kPi, kTarget);
+    figure.arrow({x, rest_height_ * scale() + 0.55 * kAir * unit()}, length, forward ? 0 : kPi,
+                 kTarget);
     scene.markers.push_back(figure.take());
     return;
   }
   Figure figure(robotFrame(task, policy), "targets", policyId(task, policy),
                 kTargetLayer * scale());
-  const double reach = std::min(halfWidth(), 0.5 * camera_.view_depth + 0.6) * scale();
+  const double reach = std::min(halfWidth(), 0.5 * view_.depth + 0.6 * size_) * scale();
   const double far = reach - 0.6 * length;
   figure.arrow({far * std::cos(target.direction), far * std::sin(target.direction)}, 1.2 * length,
                target.direction, kTarget);
@@ -183,10 +195,10 @@ MarkerArray RobotScene::moving(const SceneContent& content, const std::vector<do
         kinematics_->pose(&moment.episode->positions[moment.step * moment.episode->position_size]);
       }
       drawGeoms(*kinematics_, pictureOf(moment), scene);
-      const double y = isPlanar() ? -0.68 * kFloorDepth : -0.5 * camera_.view_depth;
-      const double up = isPlanar() ? 1 : std::sin(camera_.elevation);
-      scene.markers.push_back(textMarker(moment.lane_frame, "steps", policyId(task, policy),
-                                         {0, (y * up + (isPlanar() ? 0 : 0.1)) * scale()},
+      const double y =
+          isPlanar() ? -0.68 * kFloorDepth * unit()
+                     : -0.5 * view_.depth * std::sin(view_.elevation) * scale() + 0.1 * unit();
+      scene.markers.push_back(textMarker(moment.lane_frame, "steps", policyId(task, policy), {0, y},
                                          kRobotTextLayer, speedText(moment), 0.85 * cards_.letter,
                                          cards_.lane_width, kInk));
     }
@@ -213,14 +225,14 @@ void RobotScene::drawFloor(const Moment& moment, MarkerArray& scene) const {
   const int id = policyId(moment.task, moment.policy);
   const double s = scale();
   const double half = halfWidth();
-  const double line = 0.02 * s;
+  const double line = 0.02 * unit();
   if (isPlanar()) {
     Figure floor(moment.lane_frame, "floors", id, kFloorLayer);
-    floor.rectangle(-half * s, -0.14 * s, half * s, 0, kFloor);
+    floor.rectangle(-half * s, -0.14 * unit(), half * s, 0, kFloor);
     floor.raise();
-    for (const double x : wholeMetres(origin.x, half)) {
+    for (const double x : linesAround(origin.x, half, spacing_)) {
       const double at = (x - origin.x) * s;
-      floor.rectangle(at - line, -0.14 * s, at + line, 0, kTick);
+      floor.rectangle(at - line, -0.14 * unit(), at + line, 0, kTick);
     }
     floor.raise();
     floor.rectangle(-half * s, -line, half * s, line / 4, kFloorLine);
@@ -228,14 +240,14 @@ void RobotScene::drawFloor(const Moment& moment, MarkerArray& scene) const {
     return;
   }
   Figure floor(moment.robot_frame, "floors", id, 0);
-  const double depth = camera_.view_depth / 2;
+  const double depth = view_.depth / 2;
   floor.rectangle(-half * s, -depth * s, half * s, depth * s, kFloor);
   floor.raise();
-  for (const double x : wholeMetres(origin.x, half)) {
+  for (const double x : linesAround(origin.x, half, spacing_)) {
     const double at = (x - origin.x) * s;
     floor.rectangle(at - line / 2, -depth * s, at + line / 2, depth * s, kTick);
   }
-  for (const double y : wholeMetres(origin.y, depth)) {
+  for (const double y : linesAround(origin.y, depth, spacing_)) {
     const double at = (y - origin.y) * s;
     floor.rectangle(-half * s, at - line / 2, half * s, at + line / 2, kTick);
   }
@@ -250,8 +262,8 @@ Marker RobotScene::drawPath(const Moment& moment) const {
   if (!moment.episode) return figure.take();
   const Position& origin = (*moment.torso)[moment.step];
   const double s = scale();
-  const double deep = planar ? 0 : camera_.view_depth / 2;
-  const double high = rest_height_ + kAir;
+  const double deep = planar ? 0 : view_.depth / 2;
+  const double high = rest_height_ + kAir * size_;
   std::optional<Point> before;
   // backwards from the torso, until the path leaves the view
   for (const std::size_t i : thinnedSteps(moment.step, kMostPathPoints)) {
@@ -262,7 +274,7 @@ Marker RobotScene::drawPath(const Moment& moment) const {
     if (!seen) break;
     const Point next{offset.x * s, offset.y * s};
     if (before) {
-      figure.segment(*before, next, 0.03 * s, mix(policyColor(moment.policy), kWhite, 0.5));
+      figure.segment(*before, next, 0.03 * unit(), mix(policyColor(moment.policy), kWhite, 0.5));
     }
     before = next;
   }
@@ -276,13 +288,15 @@ std::string RobotScene::speedText(const Moment& moment) const {
   const std::size_t step = moment.step;
   const Position& now = torso[step];
   const Position& before = torso[step == 0 ? 0 : step - 1];
-  const RobotTarget& target = targets_.at(moment.task);
+  static const RobotTarget kForward;
+  const RobotTarget& target = targets_.empty() ? kForward : targets_.at(moment.task);
   const double along = ((now.x - before.x) * std::cos(target.direction) +
                         (now.y - before.y) * std::sin(target.direction)) /
                        step_seconds_;
   if (moment.episode->terminated && step == numSteps(*moment.episode)) {
-    return "fell at step " + std::to_string(step);
+    return (targets_.empty() ? "ended at step " : "fell at step ") + std::to_string(step);
   }
+  if (view_.body == 0) return "step " + std::to_string(step);
   const std::string text = number(along) + " m/s";
   return target.velocity ? text + ", target " + number(*target.velocity)
                          : "x " + number(now.x) + " m, " + text;

@@ -7,6 +7,7 @@
 
 #include "draw/card.h"
 #include "draw/robot_figure.h"
+#include "pmeta_core/env/mujoco_view.h"
 
 namespace pmeta_nodes {
 
@@ -16,25 +17,18 @@ struct RobotTarget {
   std::optional<double> velocity;  ///< m/s; none: as fast as possible
 };
 
-/// How a kind of robot is looked at.
-struct RobotCamera {
-  double elevation = 0;     ///< rad; 0 for robots that move in a plane, seen from its side
-  double view_width = 2.6;  ///< m, at least so much of the floor is seen
-  double view_depth = 0;    ///< m, the same across; 0 where elevation is
-};
-
 /// The robots of MuJoCo: a lane for each policy, in which the model's geoms play the episode by
-/// forward kinematics of the recorded configurations, while floor and view follow the torso.
+/// forward kinematics of the recorded configurations, while floor and view follow the body that
+/// MujocoView names, the torso.
 ///
 /// "task_<i>/personal" and "task_<i>/meta" have their origins on the floor below the torso, x along
 /// the lane, y up; "task_<i>/meta/robot" and its like below them is the model's world, moved along
 /// with the torso, and turned so that z goes up the lane. One metre is scale() in both.
 class RobotScene : public Scene {
  public:
-  /// `targets` has one for each task, test tasks last. Throws Error where the model has parts that
-  /// cannot be drawn. `family` must outlive the scene.
-  RobotScene(const pmeta::EnvFamily& family, std::vector<RobotTarget> targets,
-             const RobotCamera& camera);
+  /// `targets` has one for each task, test tasks last, or none where robots are not to run
+  /// anywhere. Throws Error where the environment has no model. `family` must outlive the scene.
+  RobotScene(const pmeta::EnvFamily& family, int num_tasks, std::vector<RobotTarget> targets = {});
 
   std::vector<geometry_msgs::TransformStamped> frames() const override;
   std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;
@@ -64,8 +58,10 @@ class RobotScene : public Scene {
 
   const std::vector<Position>& pathOf(int task, int policy,
                                       const pmeta_msgs::Trajectory::ConstPtr& episode);
-  bool isPlanar() const { return camera_.elevation == 0; }
-  double halfWidth() const;  ///< m of floor on either side of the torso
+  bool isPlanar() const { return view_.elevation == 0; }
+  double unit() const { return size_ * scale(); }  ///< of the scene for 1 m of a usual robot
+  double halfWidth() const;                        ///< m of floor on either side of the torso
+  std::vector<LegendEntry> legend() const;
   RobotPicture pictureOf(const Moment& moment) const;
   void drawFloor(const Moment& moment, visualization_msgs::MarkerArray& scene) const;
   visualization_msgs::Marker drawPath(const Moment& moment) const;
@@ -74,11 +70,12 @@ class RobotScene : public Scene {
 
   const pmeta::EnvFamily& family_;
   std::vector<RobotTarget> targets_;
-  RobotCamera camera_;
+  pmeta::MujocoView view_;
   std::unique_ptr<pmeta::MujocoKinematics> kinematics_;
   double step_seconds_ = 0;
-  int torso_ = 0;
   double rest_height_ = 0;  // m, of the highest point at rest
+  double size_ = 1;         // of the robot, in those of the usual ones
+  double spacing_ = 1;      // m between lines on the floor: a power of ten
   Cards cards_;
   std::map<std::pair<int, int>, Path> paths_;
 };

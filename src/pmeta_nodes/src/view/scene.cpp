@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "view/robot_scene.h"
+#include "view/trace_scene.h"
+
 namespace pmeta_nodes {
 
 using pmeta_msgs::Trajectory;
@@ -19,8 +22,13 @@ pmeta::Registry<SceneMaker>& scenes() {
 }
 
 std::unique_ptr<Scene> makeScene(const pmeta::Experiment& experiment) {
-  const SceneMaker* make = scenes().find(experiment.settings().environment);
-  return make == nullptr ? nullptr : (*make)(experiment.family(), experiment.totalTasks());
+  const pmeta::EnvFamily& family = experiment.family();
+  const int num_tasks = experiment.totalTasks();
+  if (const SceneMaker* make = scenes().find(experiment.settings().environment)) {
+    return (*make)(family, num_tasks);
+  }
+  if (family.make(0)->model() != nullptr) return std::make_unique<RobotScene>(family, num_tasks);
+  return std::make_unique<TraceScene>(family, num_tasks);
 }
 
 std::size_t numSteps(const Trajectory& trajectory) { return trajectory.rewards.size(); }

@@ -91,8 +91,8 @@ struct RegisteredScene : pmeta::Registered<SceneMaker> {
         }) {}
 };
 
-/// The scene of the experiment's environment; null if there is none. The experiment must outlive
-/// it.
+/// The scene of the experiment's environment. One that has no row is drawn from its model, or as
+/// traces where it has none. The experiment must outlive it.
 std::unique_ptr<Scene> makeScene(const pmeta::Experiment& experiment);
 
 /// Steps of an episode: the number of its rewards.

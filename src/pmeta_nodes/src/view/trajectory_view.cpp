@@ -21,12 +21,6 @@ constexpr double kLongestPlayStep = 0.5;  // s: a machine that hangs does not sk
 TrajectoryView::TrajectoryView(ros::NodeHandle nh, const pmeta::Experiment& experiment)
     : scene_(makeScene(experiment)) {
   const pmeta::ExperimentSettings& settings = experiment.settings();
-  if (scene_ == nullptr) {
-    ROS_WARN("The viewer has no scene for environment '%s': rviz stays empty.",
-             settings.environment.c_str());
-    return;
-  }
-
   const int num_tasks = experiment.totalTasks();
   content_.experiment = settings.experiment;
   content_.rounds = settings.rounds;

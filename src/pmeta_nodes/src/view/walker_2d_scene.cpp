@@ -8,7 +8,7 @@ namespace {
 class Walker2dScene : public RobotScene {
  public:
   Walker2dScene(const pmeta::Walker2dParamsFamily& family, int num_tasks)
-      : RobotScene(family, std::vector<RobotTarget>(num_tasks), {}) {}
+      : RobotScene(family, num_tasks, std::vector<RobotTarget>(num_tasks)) {}
 };
 
 const RegisteredScene<Walker2dScene, pmeta::Walker2dParamsFamily> kWalker("walker_2d_params");

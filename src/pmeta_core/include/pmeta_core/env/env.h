@@ -42,6 +42,8 @@ class BrokenEpisode : public Error {
   std::string reason_;
 };
 
+class MujocoModel;
+
 /// One MDP. All randomness comes in as an argument; the state is the only thing that is kept.
 class Env {
  public:
@@ -62,6 +64,9 @@ class Env {
 
   /// Generalised positions of the mechanism, for drawings; empty where the observation says all.
   virtual std::vector<double> configuration() const { return {}; }
+
+  /// The model whose configuration() that is; nullptr if there is none.
+  virtual const MujocoModel* model() const { return nullptr; }
 
   /// Goes on from a state() of the same task. Throws Error if `state` cannot be one, or unless
   /// spec().restorable.

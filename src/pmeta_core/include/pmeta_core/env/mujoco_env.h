@@ -23,6 +23,8 @@ class MujocoEnv : public Env {
   void setState(const std::vector<double>& state) final;
   std::vector<double> configuration() const final;  ///< qpos, as in the model
 
+  const MujocoModel* model() const final { return &simulation_.model(); }
+
   const MujocoSimulation& simulation() const { return simulation_; }
 
  protected:

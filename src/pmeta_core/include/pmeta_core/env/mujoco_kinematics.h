@@ -18,7 +18,7 @@ struct GeomShape {
     kCapsule,    ///< size: radius, half length of the cylinder, along z
     kEllipsoid,  ///< size: half axes
     kCylinder,   ///< size: radius, half length, along z
-    kBox,        ///< size: half sides
+    kBox,        ///< size: half sides; also of a mesh, as far as it reaches from its middle
   };
   Type type = Type::kSphere;
   std::string name;              ///< "" if it has none
@@ -30,8 +30,8 @@ struct GeomShape {
 /// dynamics. For drawings.
 class MujocoKinematics {
  public:
-  /// Keeps a copy of `model`. Throws Error where a body has a geom of a type GeomShape does not
-  /// know, e.g. a mesh. Geoms of the world, such as the floor, are left out.
+  /// Keeps a copy of `model`. Left out are geoms of the world, such as the floor, planes and height
+  /// fields, and meshes of bodies that have other geoms, which stand for them in collisions.
   explicit MujocoKinematics(const MujocoModel& model);
 
   const std::vector<GeomShape>& shapes() const { return shapes_; }
