@@ -355,5 +355,17 @@ TEST(TaskAgent, AMetaPolicyThatCannotBeEvaluatedFailsTheTask) {
   EXPECT_THROW(agent.evaluateMeta(meta), TaskFailed);
 }
 
+TEST(TaskAgent, TellsAllLossesOfItsLastUpdate) {
+  const Experiment experiment = gridExperiment();
+  TaskAgent agent(experiment, 0);
+  MetaPolicy meta;
+  meta.model = experiment.makeLearner(0)->initialModel(0);
+  const auto result = agent.trainRound(meta);
+  ASSERT_TRUE(result);
+  ASSERT_EQ(result->losses.size(), 1u);
+  EXPECT_EQ(result->losses.front().name, std::string("td"));
+  EXPECT_EQ(result->losses.front().value, result->loss);
+}
+
 }  // namespace
 }  // namespace pmeta

@@ -71,6 +71,7 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
   learner_->beginRound(meta.model, keeps_personal_);
   if (!guarded(round, [&] { return train(round, keep_going, result); })) return std::nullopt;
 
+  result.losses = learner_->losses();
   result.distance = distance(learner_->personal(), meta.model);
   if (!std::isfinite(result.distance)) fail(round, "its personal parameters diverged", step_sizes_);
   const std::string diverged = divergence(sent());

@@ -227,6 +227,12 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
     status_.env_steps_per_s = static_cast<double>(result->env_steps) / seconds;
     status_.updates_per_s = static_cast<double>(result->updates) / seconds;
     status_.loss = result->loss;
+    status_.loss_names.clear();
+    status_.losses.clear();
+    for (const pmeta::Loss& loss : result->losses) {
+      status_.loss_names.push_back(loss.name);
+      status_.losses.push_back(loss.value);
+    }
     status_.broken_episodes = static_cast<std::uint64_t>(agent_.brokenEpisodes());
     status_.distance_to_meta = result->distance;
     status_.train_s = std::chrono::duration<double>(end - start).count();
@@ -374,6 +380,10 @@ HealthReport TaskAgentNode::health() {
                    {"broken episodes", std::to_string(status_.broken_episodes)},
                    {"unconfirmed messages",
                     std::to_string(unconfirmed_returns_.size() + unconfirmed_updates_.size())}};
+  for (std::size_t k = 1; k < status_.losses.size(); ++k) {
+    report.values.emplace_back("loss: " + status_.loss_names[k],
+                               pmeta::formatNumber(status_.losses[k]));
+  }
   for (auto& value : refusals_.values()) {
     // of strangers only: it is not taking part
     if (newest_round_ < 0) report.level = std::max(report.level, HealthReport::kWarn);

@@ -57,6 +57,9 @@ class PersonalLearner {
   /// nothing after the first.
   UpdateStats update(Rng& rng);
 
+  /// Of the last update, see Learner::losses().
+  const std::vector<Loss>& losses() const { return parts_.learner->losses(); }
+
   /// Parameters with this task's presence mask.
   const Model& personal() const { return personal_; }
   const Model& auxiliary() const { return auxiliary_; }

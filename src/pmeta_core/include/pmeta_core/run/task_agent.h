@@ -23,6 +23,7 @@ class TaskAgent {
     std::int64_t env_steps = 0;          ///< of this round
     std::int64_t updates = 0;            ///< of this round
     double loss = 0;                     ///< of the last update
+    std::vector<Loss> losses;            ///< all there are of it; none after loadState()
     std::int64_t broken_episodes = 0;    ///< of this round's training
     double distance = 0;                 ///< ||phi - omega_meta|| over the task's own entries
 
