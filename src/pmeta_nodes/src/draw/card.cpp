@@ -15,6 +15,7 @@ constexpr double kGap = 0.1;       // between cards
 constexpr double kPadding = 0.06;  // inside a card
 constexpr double kHeader = 2.7;    // heights in letters
 constexpr double kLabel = 1.5;
+constexpr double kReadable = 0.75;  // of a card's letters: what text may shrink to
 
 const Color kGround = rgb(0xf3f4f6);
 const Color kTestGround = rgb(0xfaf3df);
@@ -63,21 +64,22 @@ std::string shortNumbers(const std::string& text) {
 /// A task's description as it fits on a card: where it is too long, what stands before a colon is
 /// left out.
 std::string shortDescription(const std::string& description, double letter, double width) {
-  constexpr double kReadable = 0.75;
   const std::string text = shortNumbers(description);
   const std::size_t colon = text.find(": ");
   const bool fits = kLetterWidth * static_cast<double>(text.size()) * kReadable * letter <= width;
   return fits || colon == std::string::npos ? text : text.substr(colon + 2);
 }
 
-/// The round is named only where it is not the one that the title names.
-std::string labelText(const Cards& cards, const SceneContent& content, int task, int policy) {
+/// The round is named only where it is not the one that the title names; `brief` text has only the
+/// policy and its return.
+std::string labelText(const Cards& cards, const SceneContent& content, int task, int policy,
+                      bool brief) {
   const bool is_meta = policy == Trajectory::META;
   if (!is_meta && cards.isTest(task)) return "";
   const PolicyView& view = viewOf(content, task, policy);
   const std::string name = is_meta ? "meta" : "personal";
   if (view.result && content.summary && view.result->round == content.summary->round) {
-    return name + " return " + number(view.result->return_mean);
+    return name + (brief ? " " : " return ") + number(view.result->return_mean);
   }
   return name + ": " + resultText(view, content, is_meta);
 }
@@ -86,18 +88,22 @@ std::string labelText(const Cards& cards, const SceneContent& content, int task,
 void drawLabels(const Cards& cards, int task, const SceneContent& content, MarkerArray& scene) {
   const bool shared = cards.lanes == 1 && !cards.isTest(task);
   const double width = (shared ? 0.49 : 0.97) * cards.lane_width;
-  std::size_t longest = 1;
-  for (const int policy : policiesOf(cards, task)) {
-    longest = std::max(longest, labelText(cards, content, task, policy).size());
-  }
-  const double letter = std::min(cards.letter, width / (kLetterWidth * longest));
+  const auto fittingLetter = [&](bool brief) {
+    std::size_t longest = 1;
+    for (const int policy : policiesOf(cards, task)) {
+      longest = std::max(longest, labelText(cards, content, task, policy, brief).size());
+    }
+    return std::min(cards.letter, width / (kLetterWidth * longest));
+  };
+  const bool brief = fittingLetter(false) < kReadable * cards.letter;
+  const double letter = fittingLetter(brief);
   for (const int policy : {Trajectory::PERSONAL, Trajectory::META}) {
     Point at = cards.laneBottom(task, policy);
     at.y += cards.lane_height + 0.5 * kLabel * cards.letter;
     if (shared) at.x += (policy == Trajectory::META ? 0.25 : -0.25) * cards.lane_width;
     scene.markers.push_back(textMarker(taskFrame(task), "results", policyId(task, policy), at,
-                                       kTextLayer, labelText(cards, content, task, policy), letter,
-                                       width, policyColor(policy)));
+                                       kTextLayer, labelText(cards, content, task, policy, brief),
+                                       letter, width, policyColor(policy)));
   }
 }
 
