@@ -293,6 +293,10 @@ TEST_F(PolicyFileTest, SaysWhatItsNumbersAreAndHowLongAStepTakes) {
   EXPECT_EQ(Json::parse(robot.at("action")).at(0), motor);
   EXPECT_EQ(robot.count("choices"), 0u);
   EXPECT_EQ(robot.at("step_seconds"), "0.05");
+  EXPECT_EQ(robot.at("hidden_activation"), "relu");
+  EXPECT_EQ(robot.at("output_squashing"), "tanh");
+  EXPECT_EQ(robot.at("output_scaling"), "none");
+  EXPECT_EQ(grid.at("hidden_activation"), "none");
 }
 
 }  // namespace

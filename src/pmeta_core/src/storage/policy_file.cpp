@@ -296,7 +296,9 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment, 
                                                   int task, int round,
                                                   const std::vector<float>& task_input) {
   const ExperimentSettings& settings = experiment.settings();
-  const EnvSpec spec = experiment.family().make(policy == PolicyKind::kMeta ? 0 : task)->spec();
+  const auto env = experiment.family().make(policy == PolicyKind::kMeta ? 0 : task);
+  const EnvSpec& spec = env->spec();
+  const PolicyForm form = experiment.learner().policies(*env, experiment.numTasks())->form();
   std::map<std::string, std::string> metadata = {
       {"environment", settings.environment},
       {"learner", settings.learner},
@@ -307,6 +309,10 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment, 
       {"num_actions", std::to_string(spec.num_actions)},
       {"observation", describe(observationsOf(spec))},
       {"action", describe(actionsOf(spec))},
+      {"hidden_activation", form.hidden_activation},
+      {"output_squashing", form.output_squashing},
+      {"input_scaling", form.input_scaling},
+      {"output_scaling", form.output_scaling},
       {"settings", experiment.runYaml()}};
   if (!spec.choices.empty()) metadata["choices"] = Json(spec.choices).dump();
   if (spec.step_seconds > 0) metadata["step_seconds"] = formatNumber(spec.step_seconds);

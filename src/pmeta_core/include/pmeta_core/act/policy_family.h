@@ -2,12 +2,21 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "pmeta_core/act/actor.h"
 #include "pmeta_core/base/model.h"
 
 namespace pmeta {
+
+/// What acts between a policy's parameters, by names that any program can go by.
+struct PolicyForm {
+  std::string hidden_activation;        ///< of hidden layers: "relu"; "none" for a table
+  std::string output_squashing;         ///< "tanh": outputs lie in (-1, 1), or "none"
+  std::string input_scaling = "none";   ///< of observations, before the first layer
+  std::string output_scaling = "none";  ///< of actions, after the squashing
+};
 
 /// All policies of one form: what their parameters are, and how they act.
 class PolicyFamily {
@@ -16,6 +25,8 @@ class PolicyFamily {
   virtual ~PolicyFamily() = default;
 
   const ModelLayout& layout() const { return layout_; }
+
+  virtual PolicyForm form() const = 0;
 
   /// How many numbers tell a policy its task beside the observation.
   virtual std::size_t taskInputSize() const = 0;

@@ -35,6 +35,7 @@ class QPolicies : public PolicyFamily {
 
   const Mlp& network() const { return network_; }
 
+  PolicyForm form() const override { return {"relu", "none"}; }
   std::size_t taskInputSize() const override { return 0; }
   void initialise(Model& parameters, Rng& rng) const override;
   std::unique_ptr<Actor> actor(const Model& parameters, std::vector<float> task_input,

@@ -20,6 +20,7 @@ class TablePolicies : public PolicyFamily {
   /// `env`, which says where states are in the table, must outlive the family.
   TablePolicies(const TabularEnv& env, double initial_value);
 
+  PolicyForm form() const override { return {"none", "none"}; }
   std::size_t taskInputSize() const override { return 0; }
   void initialise(Model& parameters, Rng& rng) const override;
   /// Knows no action in a state whose values are not present, or that is none.

@@ -36,7 +36,8 @@ PolicyFile loadPolicy(const std::string& path);
 /// meta), "task" (of a personal policy), "round", "run_id", "observation_size", "num_actions",
 /// "observation" and "action" (JSON: `[{"name": "angle", "unit": "rad", "low": -0.2, "high": 0.2},
 /// ...]`, see Quantity; null is no bound), "choices" (JSON: names of the discrete actions),
-/// "step_seconds" (how long a step takes, where there is such a time),
+/// "step_seconds" (how long a step takes, where there is such a time), "hidden_activation",
+/// "output_squashing", "input_scaling" and "output_scaling" (see PolicyForm),
 /// "task_input" (numbers with commas between, if there are any), "model_hash" and "model_file" (of
 /// a physical model, and where it was; none if it is shipped) and "settings", the effective
 /// settings as YAML, whose model_file is the run folder's copy.
