@@ -28,6 +28,7 @@ class Guesses : public PolicyFamily {
  public:
   Guesses() : PolicyFamily(ModelLayout(Precision::kFloat32, {Block{"guess", {1}}})) {}
   std::size_t taskInputSize() const override { return 0; }
+  PolicyForm form() const override { return {"none", "none", "none", "none"}; }
   void initialise(Model& parameters, Rng& rng) const override {
     std::get<std::vector<float>>(parameters.values)[0] = static_cast<float>(0.1 * rng.normal());
   }

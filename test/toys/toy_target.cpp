@@ -78,7 +78,7 @@ class ToyTargetScene : public pmeta_nodes::Scene {
     for (int task = 0; task < num_tasks_; ++task) {
       pmeta_nodes::Figure figure(pmeta_nodes::kWorldFrame, "toy_discs", task, 0);
       figure.disc({2.0 * task, 0}, 0.5, pmeta_nodes::rgb(0x3366cc));
-      scene.markers.push_back(figure.marker());
+      scene.markers.push_back(figure.take());
     }
     return scene;
   }

@@ -35,7 +35,8 @@ std::map<std::string, std::string> Experiment::definingSettingsOf(const std::str
                             ? nlohmann::json::parse(readFile(path, "the manifest"), nullptr, false)
                             : nlohmann::json::object();
   if (!manifest.is_object() || !manifest.contains("defining_settings")) {
-    return definingSettings(readFile(run_dir + "/config.yaml", "the settings file"));
+    // what there was no setting of then has its default
+    return load(run_dir + "/config.yaml").definingSettings();
   }
   const nlohmann::json& settings = manifest["defining_settings"];
   const auto is_text = [](const nlohmann::json& value) { return value.is_string(); };
