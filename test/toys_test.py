@@ -30,7 +30,7 @@ def rows_of(results_dir, run_id):
 
 
 def mean_return(rows, round_, policy):
-    found = [float(row["mean_return"]) for row in rows
+    found = [float(row["return_mean"]) for row in rows
              if row["round"] == str(round_) and row["policy"] == policy]
     assert len(found) == 3
     return sum(found) / len(found)
@@ -72,7 +72,7 @@ def test_a_name_that_nothing_has_is_refused_with_those_there_are(config):
         wrong = run([LOCAL, "check", config, key + ":=nothing"])
         assert wrong.returncode == 1 and name in wrong.stderr, wrong.stderr
     missing = run([LOCAL, "check", TOP / "test/toys/toys.yaml"])
-    assert missing.returncode == 1 and "toy_target" in missing.stderr
+    assert missing.returncode == 1 and "toy_guess" in missing.stderr
 
 
 @pytest.mark.parametrize("name", TOYS)
@@ -88,7 +88,8 @@ def test_nobody_else_had_to_know_a_toy(name):
 ELSEWHERE = {
     ("pmeta", "version.cpp"), ("pmeta", "scene.h"), ("pmeta", "runs.py"), ("pmeta", "chaos.py"),
     ("pmeta", "pmeta_html.py"),  # the project
-    ("mean", "console.cpp"), ("mean", "pmeta_figures.py"),  # a column
+    ("mean", "console.cpp"), ("mean", "pmeta_figures.py"), ("mean", "pmeta_sections.py"),
+    ("mean", "pmeta_tables.py"),  # a column
     # defaults
     ("gridworld", "experiment_settings.h"), ("q_learning", "experiment_settings.h"),
     ("pmeta", "experiment_settings.h"), ("mean", "experiment_settings.h"),
@@ -112,10 +113,11 @@ def registered_names():
             continue
         constants = dict(re.findall(r'constexpr char (k\w+)\[\] = "(\w+)";', text))
         for row in re.findall(r"^const (?:Registered|Row)[^;]*;", text, re.M):
-            words = re.findall(r'"(\w+)"', row)
-            words += [constants[word] for word in re.findall(r"k\w+", row) if word in constants]
+            words = [text or constants.get(constant)
+                     for text, constant in re.findall(r'"(\w+)"|\b(k\w+)', row)]
             # of a row the name comes first
-            names.setdefault(words[0], set()).add(path.name)
+            name = next(word for word in words if word)
+            names.setdefault(name, set()).add(path.name)
     return names
 
 
@@ -128,7 +130,7 @@ def test_a_registered_name_stands_in_the_files_of_its_row_alone():
     for path in (TOP / "src").rglob("*"):
         if path.suffix not in (".cpp", ".h", ".py"):
             continue
-        code = re.sub(r"^\s*//.*$", "", path.read_text(), flags=re.M)
+        code = re.sub(r"//.*$", "", path.read_text(), flags=re.M)
         found |= {(name, path.name) for name in re.findall(r"""["'](\w+)["']""", code)
                   if name in names}
     # an environment's own files may say its name again, as half_cheetah.h's do
