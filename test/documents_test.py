@@ -18,7 +18,7 @@ PROGRAMS = ("./pmeta", "devel/lib/", "roslaunch", "rosrun", "rostopic", "rosserv
             "rosmsg", "source", "cmake", "catkin_make")
 
 # longer than a minute, or of a machine of its own; the rest of the command may be anything
-LONG = (r"\./pmeta (test|fuzz|chaos|bench|build|setup|results)\b", r"cmake |catkin_make",
+LONG = (r"\./pmeta (test|fuzz|chaos|bench|build|setup|results|coverage|lint)\b", r"cmake |catkin_make",
         r"\./pmeta screenshot\b", r"\./pmeta run (ant_fwd_back|half_cheetah|walker|sparse)",
         r"\./pmeta run .*preset:=paper", r"\./pmeta sweep (?!gridworld )",
         r"\./pmeta run .*netns")
