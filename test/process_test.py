@@ -83,7 +83,7 @@ def test_under_nohup_a_closed_terminal_stops_nothing(tmp_path):
 
 
 def test_a_limit_on_file_sizes_is_told_as_a_full_disk(tmp_path):
-    done = shell(tmp_path, 'ulimit -f 2; "$@"', "rounds:=100", "checkpoint.interval:=0")
+    done = shell(tmp_path, 'ulimit -f 16; "$@"', "rounds:=100", "checkpoint.interval:=0")
     assert done.returncode == 1
     assert "rounds.csv (File too large): is the disk full?" in done.stderr
 
