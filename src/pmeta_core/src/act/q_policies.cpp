@@ -1,6 +1,6 @@
 #include "pmeta_core/act/q_policies.h"
 
-#include <algorithm>
+#include "pmeta_core/act/greedy_action.h"
 
 namespace pmeta {
 
@@ -12,8 +12,8 @@ void QActor::look(const float* observations, const std::vector<std::size_t>& env
 }
 
 bool QActor::act(std::size_t row, Rng&, double* action) {
-  const float* values = values_ + row * network_.outputs();
-  *action = static_cast<double>(std::max_element(values, values + network_.outputs()) - values);
+  const std::size_t n = network_.outputs();
+  *action = greedyAction(values_ + row * n, static_cast<int>(n));
   return true;
 }
 

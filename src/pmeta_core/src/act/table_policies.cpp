@@ -42,11 +42,6 @@ class GreedyTable : public Actor {
 
 }  // namespace
 
-int greedyAction(const double* action_values, int num_actions) {
-  return static_cast<int>(std::max_element(action_values, action_values + num_actions) -
-                          action_values);
-}
-
 TablePolicies::TablePolicies(const TabularEnv& env, double initial_value)
     : PolicyFamily(
           ModelLayout(Precision::kFloat64, {{"q_table",

@@ -2,16 +2,10 @@
 
 #include <algorithm>
 
+#include "pmeta_core/act/greedy_action.h"
 #include "pmeta_core/nn/kernels.h"
 
 namespace pmeta {
-namespace {
-
-int bestOf(const float* values, int n) {
-  return static_cast<int>(std::max_element(values, values + n) - values);
-}
-
-}  // namespace
 
 DqnUpdate::DqnUpdate(const Mlp& network, const DqnSettings& settings)
     : network_(network),
@@ -66,7 +60,7 @@ void DqnUpdate::computeTargets(const float* parameters, const ReplayBatch& batch
   }
   for (int b = 0; b < settings_.batch_size; ++b) {
     const int row = b * num_actions_;
-    const int action = bestOf(chooser + row, num_actions_);
+    const int action = greedyAction(chooser + row, num_actions_);
     td_targets_[b] = batch.rewards[b] + batch.discounts[b] * target_values_[row + action];
   }
 }

@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "pmeta_core/act/greedy_action.h"
 #include "pmeta_core/act/policy_family.h"
 #include "pmeta_core/env/tabular_env.h"
 
@@ -10,9 +11,6 @@ namespace pmeta {
 
 /// Action values, row-major: entry (state, action) at state * num_actions + action.
 using QTable = std::vector<double>;
-
-/// The action of the largest value; the lowest index wins a tie.
-int greedyAction(const double* action_values, int num_actions);
 
 /// Greedy policies of tables of action values (float64, one block "q_table").
 class TablePolicies : public PolicyFamily {
