@@ -56,11 +56,10 @@ std::vector<YAML::Node> choosePreset(YAML::Node base, const std::string& source,
               (known.empty() ? " has none." : " has " + join(known) + "."));
 }
 
-// a path that is relative is so to the folder, or to the working folder if that is ""
+// a relative path from a file of that folder; absolutePath() makes the rest of it
 std::string anchored(const std::string& path, const std::string& folder) {
-  namespace fs = std::filesystem;
   if (path.empty() || path.front() == '~') return path;
-  return ((folder.empty() ? fs::current_path() : fs::path(folder)) / path).string();
+  return (std::filesystem::path(folder) / path).string();
 }
 
 }  // namespace
@@ -137,7 +136,6 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   for (const YAML::Node& file : files) settings.read(file, source);
   experiment.anchorPaths(folder);
   for (const std::string& assignment : overrides) settings.assign(assignment);
-  experiment.anchorPaths("");
 
   ExperimentSettings& e = experiment.settings_;
   requirePlainName("experiment", e.experiment);
