@@ -27,6 +27,15 @@ const std::vector<std::string> kPull = {"personal.lambda",        "personal.lamb
                                         "personal.eta",           "personal.personal_init",
                                         "personal.proximal"};
 
+// null where there is none
+Json entryOf(const std::string& run_dir, const char* key) {
+  const std::string path = run_dir + "/manifest.json";
+  if (!std::filesystem::exists(path)) return {};
+  Json manifest = Json::parse(readFile(path, "the manifest"), nullptr, false);
+  if (!manifest.is_object() || !manifest.contains(key)) return {};
+  return std::move(manifest[key]);
+}
+
 std::vector<std::string> fixedSettings(const Experiment& experiment, const Algorithm& algorithm) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : experiment.definingSettings()) {
@@ -108,22 +117,21 @@ std::string constantManifest(const Experiment& experiment, const std::string& st
 }
 
 std::string manifestText(const std::string& run_dir, const char* key) {
-  const std::string path = run_dir + "/manifest.json";
-  if (!std::filesystem::exists(path)) return "";
-  const auto manifest = Json::parse(readFile(path, "the manifest"), nullptr, false);
-  const bool given = manifest.is_object() && manifest.contains(key) && manifest[key].is_string();
-  return given ? manifest[key].get<std::string>() : "";
+  const Json entry = entryOf(run_dir, key);
+  return entry.is_string() ? entry.get<std::string>() : "";
+}
+
+std::int64_t manifestCount(const std::string& run_dir, const char* key) {
+  const Json entry = entryOf(run_dir, key);
+  return entry.is_number_integer() ? entry.get<std::int64_t>() : 0;
 }
 
 std::string otherMachine(const Experiment& experiment) {
   // tables have no matrix products; portable ones are the same everywhere
   if (!experiment.learner().hasNetworks()) return "";
   const bool portable = experiment.settings().arithmetic == "portable";
-  const std::string path = experiment.runDir() + "/manifest.json";
-  if (!std::filesystem::exists(path)) return "";
-  const Json manifest = Json::parse(readFile(path, "the manifest"), nullptr, false);
-  if (!manifest.is_object() || !manifest.contains("machine")) return "";
-  const Json& before = manifest["machine"];
+  const Json before = entryOf(experiment.runDir(), "machine");
+  if (before.is_null()) return "";
   const std::map<std::string, std::string> now = machine();
   for (const char* part : {"products", "processor", "glibc"}) {
     if (portable && part != std::string("glibc")) continue;

@@ -128,10 +128,7 @@ RunLog RunLog::reopen(const Experiment& experiment, int rounds_done, RunLock loc
   requireUnfinished(dir);
   const std::string started = manifestText(dir, "started");
   RunLog log(experiment, started.empty() ? utcTime() : started, rounds_done, std::move(lock));
-  const auto before = Json::parse(std::ifstream(dir + "/manifest.json"), nullptr, false);
-  if (before.contains("broken_episodes") && before["broken_episodes"].is_number_integer()) {
-    log.broken_episodes_ = before["broken_episodes"].get<std::int64_t>();
-  }
+  log.broken_episodes_ = manifestCount(dir, "broken_episodes");
   requireWritable(dir);
   const EvaluationSchedule evaluations = experiment.evaluationSchedule();
   int evaluated = rounds_done;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "pmeta_core/experiment/experiment.h"
@@ -22,6 +23,8 @@ std::string constantManifest(const Experiment& experiment, const std::string& st
 
 /// A text of the run folder's manifest.json; "" if there is none.
 std::string manifestText(const std::string& run_dir, const char* key);
+/// The same of a whole number; 0 if there is none.
+std::int64_t manifestCount(const std::string& run_dir, const char* key);
 
 /// What differs between the machine that the run folder's manifest names and this one, as one
 /// sentence, where it changes the numbers of this experiment; "" if nothing does.
