@@ -90,4 +90,30 @@ void forEachLane(const Cards& cards, const SceneContent& content,
   }
 }
 
+/// A scene of cards in whose lanes episodes are played, each as drawMoving() has it.
+class LaneScene : public Scene {
+ public:
+  visualization_msgs::MarkerArray moving(const SceneContent& content,
+                                         const std::vector<double>& seconds) final {
+    visualization_msgs::MarkerArray scene;
+    forEachLane(cards_, content, seconds,
+                [&](const PolicyView& view, int task, int policy, double at) {
+                  drawMoving(view, task, policy, at, scene);
+                });
+    return scene;
+  }
+
+  double scale() const { return cards_.scale; }  ///< units of the scene for 1 of its content's
+
+ protected:
+  explicit LaneScene(const Cards& cards) : cards_(cards) {}
+
+  const Cards cards_;
+
+ private:
+  /// One lane, so many seconds after the episode's start.
+  virtual void drawMoving(const PolicyView& view, int task, int policy, double seconds,
+                          visualization_msgs::MarkerArray& scene) const = 0;
+};
+
 }  // namespace pmeta_nodes

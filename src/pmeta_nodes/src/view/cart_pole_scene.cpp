@@ -65,9 +65,9 @@ void drawTrace(Figure& figure, const Trajectory& episode, double scale, const Co
 }  // namespace
 
 CartPoleScene::CartPoleScene(const pmeta::CartPoleFamily& family, int num_tasks)
-    : family_(family),
-      cards_(layoutCards(num_tasks, family.numTasks(), 2, 2 * kHalfTrack,
-                         kTrace + kCartHeight + longestPole(family) + kAir)) {}
+    : LaneScene(layoutCards(num_tasks, family.numTasks(), 2, 2 * kHalfTrack,
+                            kTrace + kCartHeight + longestPole(family) + kAir)),
+      family_(family) {}
 
 std::vector<geometry_msgs::TransformStamped> CartPoleScene::frames() const {
   std::vector<geometry_msgs::TransformStamped> frames = cardFrames(cards_);
@@ -115,15 +115,6 @@ MarkerArray CartPoleScene::still(const SceneContent& content) const {
                },
                "limits of the track"}},
              scene);
-  return scene;
-}
-
-MarkerArray CartPoleScene::moving(const SceneContent& content, const std::vector<double>& seconds) {
-  MarkerArray scene;
-  forEachLane(cards_, content, seconds,
-              [&](const PolicyView& view, int task, int policy, double at) {
-                drawMoving(view, task, policy, at, scene);
-              });
   return scene;
 }
 

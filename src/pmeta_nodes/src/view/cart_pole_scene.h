@@ -10,7 +10,7 @@ namespace pmeta_nodes {
 ///
 /// The lane's frame has its origin on the track where the cart's position is 0. A fallen pole turns
 /// grey. Poles of more than kLongestPole are drawn with that length.
-class CartPoleScene : public Scene {
+class CartPoleScene : public LaneScene {
  public:
   static constexpr double kTimeStep = 0.02;      ///< s, the environment's
   static constexpr double kPositionLimit = 2.4;  ///< m, beyond which an episode ends
@@ -23,18 +23,13 @@ class CartPoleScene : public Scene {
   std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;
   double stepSeconds() const override { return kTimeStep; }
   visualization_msgs::MarkerArray still(const SceneContent& content) const override;
-  visualization_msgs::MarkerArray moving(const SceneContent& content,
-                                         const std::vector<double>& seconds) override;
-
-  double scale() const { return cards_.scale; }  ///< units of the scene for 1 m
 
  private:
   double poleLength(int task) const;
   void drawMoving(const PolicyView& view, int task, int policy, double seconds,
-                  visualization_msgs::MarkerArray& scene) const;
+                  visualization_msgs::MarkerArray& scene) const override;
 
   const pmeta::CartPoleFamily& family_;
-  Cards cards_;
 };
 
 }  // namespace pmeta_nodes

@@ -90,8 +90,8 @@ double MountainCarScene::height(double zeta, double position) {
 }
 
 MountainCarScene::MountainCarScene(const pmeta::MountainCarFamily& family, int num_tasks)
-    : family_(family),
-      cards_(layoutCards(num_tasks, family.numTasks(), 1, kWidth, kSteps + kHeight)) {}
+    : LaneScene(layoutCards(num_tasks, family.numTasks(), 1, kWidth, kSteps + kHeight)),
+      family_(family) {}
 
 double MountainCarScene::velocityScale() const {
   return kPhaseHeight / 2 / kHighestSpeed * scale();
@@ -160,16 +160,6 @@ visualization_msgs::Marker MountainCarScene::drawPath(const PolicyView& view, in
   return pathMarker(phaseFrame(task), task, policy, kPathLayer, view, kMostPathPoints,
                     0.034 * scale(), 0.016 * scale(),
                     [&](std::size_t step) { return phasePoint(*view.episode, step); });
-}
-
-MarkerArray MountainCarScene::moving(const SceneContent& content,
-                                     const std::vector<double>& seconds) {
-  MarkerArray scene;
-  forEachLane(cards_, content, seconds,
-              [&](const PolicyView& view, int task, int policy, double at) {
-                drawMoving(view, task, policy, at, scene);
-              });
-  return scene;
 }
 
 void MountainCarScene::drawMoving(const PolicyView& view, int task, int policy, double seconds,

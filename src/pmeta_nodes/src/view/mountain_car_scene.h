@@ -11,7 +11,7 @@ namespace pmeta_nodes {
 ///
 /// Frames "task_<i>/hill" and "task_<i>/phase" have their origins at position 0 and height or
 /// velocity 0.
-class MountainCarScene : public Scene {
+class MountainCarScene : public LaneScene {
  public:
   /// s; the environment knows no seconds, this is what Gym draws it with.
   static constexpr double kTimeStep = 1 / 30.0;
@@ -22,23 +22,19 @@ class MountainCarScene : public Scene {
   std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;
   double stepSeconds() const override { return kTimeStep; }
   visualization_msgs::MarkerArray still(const SceneContent& content) const override;
-  visualization_msgs::MarkerArray moving(const SceneContent& content,
-                                         const std::vector<double>& seconds) override;
 
   /// Height of the track, as Gym draws it: 0.45 sin(zeta x) + 0.55.
   static double height(double zeta, double position);
 
-  double scale() const { return cards_.scale; }  ///< units of the scene for 1 of position or height
-  double velocityScale() const;                  ///< the same for 1 of velocity, in the phase plot
+  double velocityScale() const;  ///< scale() for 1 of velocity, in the phase plot
 
  private:
   Point phasePoint(const pmeta_msgs::Trajectory& episode, std::size_t step) const;
   visualization_msgs::Marker drawPath(const PolicyView& view, int task, int policy) const;
   void drawMoving(const PolicyView& view, int task, int policy, double seconds,
-                  visualization_msgs::MarkerArray& scene) const;
+                  visualization_msgs::MarkerArray& scene) const override;
 
   const pmeta::MountainCarFamily& family_;
-  Cards cards_;
 };
 
 }  // namespace pmeta_nodes

@@ -39,20 +39,21 @@ constexpr double kPointLayer = 0.25;
 const Color kFaintGoal = rgb(0xbcc3cf);
 const Color kGoal = rgb(0xe08a00);
 
-bool hasGoalBelow(const pmeta::SparsePointFamily& family, int num_tasks) {
+/// Lower edge of the plane that is seen.
+double bottomOf(const pmeta::SparsePointFamily& family, int num_tasks) {
   for (int task = 0; task < num_tasks; ++task) {
-    if (family.task(task).goal_y < -1e-9) return true;
+    if (family.task(task).goal_y < -1e-9) return -kTop;
   }
-  return false;
+  return kBottom;
 }
 
 }  // namespace
 
 SparsePointScene::SparsePointScene(const pmeta::SparsePointFamily& family, int num_tasks)
-    : family_(family) {
-  bottom_ = hasGoalBelow(family, num_tasks) ? -kTop : kBottom;
-  cards_ = layoutCards(num_tasks, family.numTasks(), 1, kRight - kLeft + kMaps, kTop - bottom_);
-}
+    : LaneScene(layoutCards(num_tasks, family.numTasks(), 1, kRight - kLeft + kMaps,
+                            kTop - bottomOf(family, num_tasks))),
+      family_(family),
+      bottom_(bottomOf(family, num_tasks)) {}
 
 std::vector<geometry_msgs::TransformStamped> SparsePointScene::frames() const {
   std::vector<geometry_msgs::TransformStamped> frames = cardFrames(cards_);
@@ -179,16 +180,6 @@ visualization_msgs::Marker SparsePointScene::drawPath(const PolicyView& view, in
   return pathMarker(planeFrame(task), task, policy, kPathLayer, view, kMostPathPoints,
                     0.05 * scale(), 0.022 * scale(),
                     [&](std::size_t step) { return pointAt(*view.episode, step); });
-}
-
-MarkerArray SparsePointScene::moving(const SceneContent& content,
-                                     const std::vector<double>& seconds) {
-  MarkerArray scene;
-  forEachLane(cards_, content, seconds,
-              [&](const PolicyView& view, int task, int policy, double at) {
-                drawMoving(view, task, policy, at, scene);
-              });
-  return scene;
 }
 
 void SparsePointScene::drawMoving(const PolicyView& view, int task, int policy, double seconds,

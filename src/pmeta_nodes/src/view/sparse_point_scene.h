@@ -11,7 +11,7 @@ namespace pmeta_nodes {
 /// worth.
 ///
 /// Frames "task_<i>/plane" have their origins where episodes start.
-class SparsePointScene : public Scene {
+class SparsePointScene : public LaneScene {
  public:
   static constexpr double kTimeStep = 0.2;  ///< s; the environment knows no seconds
 
@@ -22,10 +22,6 @@ class SparsePointScene : public Scene {
   std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;
   double stepSeconds() const override { return kTimeStep; }
   visualization_msgs::MarkerArray still(const SceneContent& content) const override;
-  visualization_msgs::MarkerArray moving(const SceneContent& content,
-                                         const std::vector<double>& seconds) override;
-
-  double scale() const { return cards_.scale; }  ///< units of the scene for 1
 
  private:
   /// The first step, up to `last`, after which the point is at the goal; -1 if there is none.
@@ -37,11 +33,10 @@ class SparsePointScene : public Scene {
                 visualization_msgs::MarkerArray& scene) const;
   visualization_msgs::Marker drawPath(const PolicyView& view, int task, int policy) const;
   void drawMoving(const PolicyView& view, int task, int policy, double seconds,
-                  visualization_msgs::MarkerArray& scene) const;
+                  visualization_msgs::MarkerArray& scene) const override;
 
   const pmeta::SparsePointFamily& family_;
-  double bottom_ = 0;  // of the plane that is seen
-  Cards cards_;
+  const double bottom_;  // of the plane that is seen
 };
 
 }  // namespace pmeta_nodes

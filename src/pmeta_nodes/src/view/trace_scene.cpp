@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <iomanip>
-#include <locale>
-#include <sstream>
 
+#include "pmeta_core/base/format.h"
 #include "pmeta_core/base/settings.h"
 
 namespace pmeta_nodes {
@@ -51,13 +49,6 @@ visualization_msgs::Marker sideText(const std::string& ns, int task, int id, con
   const double half = 0.5 * lineWidth(text) * height;
   return textMarker(taskFrame(task), ns, id, {edge.x + (to_right ? half : -half), edge.y},
                     kTextLayer, text, height, kSceneWidth, color);
-}
-
-std::string shortNumber(double value) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << std::setprecision(3) << value;
-  return text.str();
 }
 
 std::string nameOf(const pmeta::Quantity& quantity) {
@@ -276,8 +267,8 @@ void TraceScene::drawPlots(int task, const std::vector<Trace>& traces, std::size
 std::string TraceScene::scaleOf(const Trace& trace) const {
   if (trace.source == Source::kAction && !spec_.choices.empty()) return pmeta::join(spec_.choices);
   if (trace.low > trace.high) return "";
-  if (trace.low == trace.high) return shortNumber(trace.low);
-  return shortNumber(trace.low) + " to " + shortNumber(trace.high);
+  if (trace.low == trace.high) return pmeta::significant(trace.low, 3);
+  return pmeta::significant(trace.low, 3) + " to " + pmeta::significant(trace.high, 3);
 }
 
 void TraceScene::drawTraces(int task, int policy, const std::vector<Trace>& traces,
