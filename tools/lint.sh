@@ -7,7 +7,7 @@ lint_quick() (
   mapfile -t sources < <(git ls-files --cached --others --exclude-standard '*.cpp' '*.h')
   clang-format-14 --dry-run -Werror "${sources[@]}" || failed=1
   shellcheck pmeta .ci/run tools/*.sh tools/commands/*.sh || failed=1
-  pyflakes3 src/pmeta_nodes/scripts test || failed=1
+  pyflakes3 src/pmeta_nodes/scripts test tools || failed=1
   return $failed
 )
 
