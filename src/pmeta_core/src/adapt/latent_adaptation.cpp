@@ -18,8 +18,9 @@ const ContextEncoder& requireEncoder(const SacNetworks& networks) {
 
 LatentAdaptation::LatentAdaptation(const SacNetworks& networks, const ContextSettings& settings,
                                    const float* parameters)
-    : encoder_(requireEncoder(networks)),
-      encoder_parameters_(parameters + networks.encoderOffset()),
+    : networks_(networks),
+      parameters_(parameters),
+      encoder_(requireEncoder(networks)),
       workspace_(encoder_, static_cast<std::size_t>(settings.batch_size)),
       acting_(networks.actor(), std::vector<float>(encoder_.latentSize()), 1,
               settings.exploration_noise ? GaussianActor::By::kSample : GaussianActor::By::kMean,
@@ -50,8 +51,13 @@ void LatentAdaptation::observe(const Experience& e) {
 }
 
 void LatentAdaptation::episodeOver() {
-  encoder_.infer(encoder_parameters_, context_.data(), context_.size() / encoder_.rowSize(),
-                 workspace_, posterior_);
+  encoder_.infer(parameters_ + networks_.encoderOffset(), context_.data(),
+                 context_.size() / encoder_.rowSize(), workspace_, posterior_);
+}
+
+std::unique_ptr<Actor> LatentAdaptation::adapted(std::size_t max_batch) const {
+  return std::make_unique<GaussianActor>(networks_.actor(), taskInput(), max_batch,
+                                         GaussianActor::By::kMean, parameters_);
 }
 
 std::vector<float> LatentAdaptation::taskInput() const {

@@ -117,24 +117,8 @@ ReturnStats PersonalLearner::evaluate(const Model& policy, Rng& rng) const {
 
 std::vector<AdaptedReturn> PersonalLearner::evaluateAdapted(const Model& policy, Rng& rng) const {
   if (!parts_.adapt) return {{0, evaluate(policy, rng), taskInput(policy)}};
-  const Rng starts = rng;
   const std::unique_ptr<Adaptation> adaptation = parts_.adapt(policy);
-  const std::vector<int>& counts = parts_.exploration_episodes;
-  // `rng` moves on, away from the starts
-  const std::vector<float> unknown = adaptation->taskInput();
-  std::vector<AdaptedReturn> returns = {{0, run(policy, unknown, rng), unknown}};
-  int broken = 0;  // since the last return
-  for (int episode = 1; episode <= counts.back(); ++episode) {
-    adaptation->beginEpisode(rng);
-    broken += evaluation_->explore(*adaptation, rng) ? 0 : 1;
-    adaptation->episodeOver();
-    if (std::count(counts.begin(), counts.end(), episode) == 0) continue;
-    Rng same_starts = starts;
-    const std::vector<float> known = adaptation->taskInput();
-    returns.push_back({episode, run(policy, known, same_starts), known});
-    returns.back().stats.broken_episodes += std::exchange(broken, 0);
-  }
-  return returns;
+  return pmeta::evaluateAdapted(*evaluation_, *adaptation, parts_.exploration_episodes, rng);
 }
 
 Episode PersonalLearner::record(const Model& policy, Rng& rng) const {

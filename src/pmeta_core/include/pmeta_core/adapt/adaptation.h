@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "pmeta_core/act/actor.h"
@@ -16,9 +18,13 @@ class Adaptation : public Actor {
   /// The exploration episode at hand has come to its end, or has broken down.
   virtual void episodeOver() = 0;
 
-  /// What the policy is to be told of the task by what is known so far: see
-  /// PolicyFamily::taskInputSize().
-  virtual std::vector<float> taskInput() const = 0;
+  /// Acts greedily by what is known so far, in up to `max_batch` environments at once, each episode
+  /// on its own. What this was made of must outlive it; what is learnt later does not reach it.
+  virtual std::unique_ptr<Actor> adapted(std::size_t max_batch) const = 0;
+
+  /// What the policy is told of the task by what is known so far: see
+  /// PolicyFamily::taskInputSize(). Nothing, where it gets to know the task in another way.
+  virtual std::vector<float> taskInput() const { return {}; }
 };
 
 }  // namespace pmeta

@@ -26,11 +26,13 @@ class LatentAdaptation : public Adaptation {
   bool act(std::size_t row, Rng& rng, double* action) override;
   void observe(const Experience& experience) override;
   void episodeOver() override;
+  std::unique_ptr<Actor> adapted(std::size_t max_batch) const override;
   std::vector<float> taskInput() const override;
 
  private:
+  const SacNetworks& networks_;
+  const float* parameters_;
   const ContextEncoder& encoder_;
-  const float* encoder_parameters_;
   ContextEncoder::Workspace workspace_;
   GaussianActor acting_;
   LatentPosterior posterior_;

@@ -7,8 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "pmeta_core/act/evaluation.h"
-#include "pmeta_core/adapt/adaptation.h"
+#include "pmeta_core/adapt/adapted_return.h"
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/learn/learner.h"
 #include "pmeta_core/personal/personal_settings.h"
@@ -16,13 +15,6 @@
 #include "pmeta_core/personal/proximal_sgd.h"
 
 namespace pmeta {
-
-/// Return of a policy that was given some exploration episodes to find out about the task.
-struct AdaptedReturn {
-  int context_episodes = 0;  ///< how many; 0: before any
-  ReturnStats stats;
-  std::vector<float> task_input = {};  ///< what it was told of the task then
-};
 
 /// What a personal learner is made of.
 struct PersonalParts {
