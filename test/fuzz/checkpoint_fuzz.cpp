@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <deque>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -24,7 +25,7 @@ struct SavedRun {
   explicit SavedRun(const std::string& kind)
       : experiment(test::checkpointExperiment(kind, "/tmp/pmeta_unused")) {
     MetaAggregator aggregator(experiment);
-    std::vector<TaskAgent> agents;
+    std::deque<TaskAgent> agents;
     for (int task = 0; task < experiment.numTasks(); ++task) agents.emplace_back(experiment, task);
     for (int round = 0; round < 2; ++round) {
       for (TaskAgent& agent : agents) {

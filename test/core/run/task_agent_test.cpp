@@ -157,7 +157,7 @@ TEST(TaskAgent, PoliciesThatDoNotFitAreRefused) {
                                ": start it with the same configuration.";
   EXPECT_EQ(errorOf([&] { agent.trainRound(other); }), sentence);
   EXPECT_EQ(errorOf([&] { agent.evaluateMeta(other); }), sentence);
-  EXPECT_EQ(errorOf([&] { agent.recordMeta(other); }), sentence);
+  EXPECT_EQ(errorOf([&] { agent.recordMeta(other, 0); }), sentence);
   MetaPolicy broken = firstMeta(experiment);
   broken.model.doubles()[5] = std::nan("");
   EXPECT_EQ(errorOf([&] { agent.trainRound(broken); }),
@@ -168,15 +168,15 @@ TEST(TaskAgent, RecordsFromTheSameStartWhateverThePolicyAndRound) {
   const Experiment experiment = gridExperiment();
   TaskAgent agent(experiment, 4);
   agent.trainRound(firstMeta(experiment));
-  const Episode personal = agent.recordPersonal();
-  EXPECT_EQ(errorOf([&] { agent.recordMeta(laterMeta(experiment, 6)); }),
+  const Episode personal = *agent.recordPersonal();
+  EXPECT_EQ(errorOf([&] { agent.recordMeta(laterMeta(experiment, 6), 0); }),
             "the meta-policy of round 6 has not been evaluated: do that before recording an "
             "episode of it.");
   agent.evaluateMeta(laterMeta(experiment, 6));
-  const Episode meta = agent.recordMeta(laterMeta(experiment, 6));
+  const Episode meta = agent.recordMeta(laterMeta(experiment, 6), 0);
   const std::vector<double> start(personal.observations.begin(), personal.observations.begin() + 2);
   EXPECT_EQ(std::vector<double>(meta.observations.begin(), meta.observations.begin() + 2), start);
-  EXPECT_EQ(agent.recordPersonal().observations, personal.observations);
+  EXPECT_EQ(agent.recordPersonal()->observations, personal.observations);
 
   // drawn from the stream that is for evaluation
   Rng rng(0, 4, Stream::kEvaluate);
@@ -191,7 +191,7 @@ TEST(TaskAgent, WatchingDoesNotChangeTraining) {
   for (int round = 0; round < 3; ++round) {
     const MetaPolicy meta = laterMeta(experiment, round);
     watched.evaluateMeta(meta);
-    watched.recordMeta(meta);
+    watched.recordMeta(meta, 0);
     const auto a = watched.trainRound(meta), b = alone.trainRound(meta);
     watched.recordPersonal();
     EXPECT_TRUE(a->update.model == b->update.model);
@@ -245,12 +245,12 @@ TEST(TaskAgent, TheRecordedEpisodeIsOfThePolicyWhoseReturnIsShown) {
     const auto sum = [](const Episode& episode) {
       return std::accumulate(episode.rewards.begin(), episode.rewards.end(), 0.0);
     };
-    EXPECT_DOUBLE_EQ(sum(agent.recordMeta(meta)), returns[2].mean);
+    EXPECT_DOUBLE_EQ(sum(agent.recordMeta(meta, 0)), returns[2].mean);
     EXPECT_NE(returns[0].mean, returns[2].mean) << "before exploration it acts in another way";
     EXPECT_NE(returns[1].mean, returns[2].mean);
     if (!agent.trains()) continue;
     const auto result = agent.trainRound(meta);
-    EXPECT_DOUBLE_EQ(sum(agent.recordPersonal()), result->personal->mean);
+    EXPECT_DOUBLE_EQ(sum(*agent.recordPersonal()), result->personal->mean);
   }
 }
 

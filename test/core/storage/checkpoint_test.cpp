@@ -446,7 +446,7 @@ TEST(HostileState, AggregatorAndBookRefuseWhatIsNotTheirs) {
   const Experiment experiment = checkpointExperiment("table", "/tmp/pmeta_unused");
   MetaAggregator aggregator(experiment);
   RoundBook book(experiment);
-  std::vector<TaskAgent> agents;
+  std::deque<TaskAgent> agents;
   for (int task = 0; task < 2; ++task) agents.emplace_back(experiment, task);
   for (int round = 1; round <= 2; ++round) {
     for (TaskAgent& agent : agents) {

@@ -1,5 +1,8 @@
 // The algorithms that come with the suite.
+#include <map>
+
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/baselines/meta_learner.h"
 #include "pmeta_core/experiment/algorithm.h"
 
 namespace pmeta {
@@ -7,6 +10,29 @@ namespace pmeta {
 Registry<Algorithm>& algorithms() {
   static Registry<Algorithm> algorithms("algorithm");
   return algorithms;
+}
+
+std::vector<std::string> algorithmNames() {
+  std::vector<std::string> names = algorithms().names();
+  const std::vector<std::string> more = metaLearners().names();
+  names.insert(names.end(), more.begin(), more.end());
+  return names;
+}
+
+const Algorithm& algorithmNamed(const std::string& name) {
+  if (const Algorithm* algorithm = algorithms().find(name)) return *algorithm;
+  static std::map<std::string, Algorithm> of_meta_learners;
+  if (const MetaLearnerRow* row = metaLearners().find(name)) {
+    Algorithm& algorithm = of_meta_learners[name];
+    algorithm.label = row->label;
+    algorithm.meaning = row->meaning;
+    return algorithm;
+  }
+  const std::vector<std::string> known = algorithmNames();
+  const std::string guess = nearest(name, known);
+  throw Error("unknown algorithm '" + name + "'" +
+              (guess.empty() ? "." : ": did you mean '" + guess + "'?") + " Known are " +
+              join(known) + ".");
 }
 
 namespace {

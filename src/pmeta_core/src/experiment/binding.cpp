@@ -21,9 +21,11 @@ void Experiment::bind(Settings& s) {
   s.bind("library", e.library,
          "shared library whose environments, learners, algorithms, rules and scenes are added to "
          "those of the suite; \"\" for none");
-  s.bind("algorithm", e.algorithm, "what is trained", algorithms().names());
-  s.bind("learner", e.learner, meanings(learners()), learners().names());
-  if (learner_->hasNetworks()) {
+  s.bind("algorithm", e.algorithm, "what is trained", algorithmNames());
+  if (!hasMetaLearner()) {
+    s.bind("learner", e.learner, meanings(learners()), learners().names());
+  }
+  if (hasNetworks()) {
     s.bind(
         "arithmetic", e.arithmetic,
         "matrix products of networks: native, with the instructions of this processor; portable, "
@@ -46,15 +48,37 @@ void Experiment::bind(Settings& s) {
   s.bind("key_file", e.key_file,
          "over ROS: file with the key that messages are authenticated with (./pmeta key FILE); "
          "\"\" for none");
-  s.bind("fresh_episodes", e.fresh_episodes,
-         "local runner: after the last round, evaluate the last and the best policies again, on so "
-         "many fresh episodes a task",
-         Range::between(0, 1e6));
-
   s.bind("checkpoint.interval", e.checkpoint_interval,
          "rounds from one checkpoint of the whole run to the next; 0: none",
          Range::between(0, 1e6));
 
+  if (hasMetaLearner()) {
+    s.bind("steps_per_round", e.steps_per_round,
+           "transitions of a round, over all training tasks, made in whole iterations: what is too "
+           "much counts for the next; 0: updates_per_round times the tasks",
+           Range::between(0, 1e12));
+    s.bind("threads", e.threads,
+           "that act in environments at the same time; the result is the same",
+           Range::between(1, 1024));
+    s.bind("aggregation.round_timeout", e.aggregation.round_timeout,
+           "seconds after which a round counts as late", Range::above(0));
+    meta_learner_->bind(s);
+  } else {
+    bindLearning(s);
+    bindAggregation(s);
+  }
+
+  s.bind("environment.name", e.environment, "family of environments", envFamilies().names());
+  family_->bind(s);
+}
+
+// of agents
+void Experiment::bindLearning(Settings& s) {
+  ExperimentSettings& e = settings_;
+  s.bind("fresh_episodes", e.fresh_episodes,
+         "local runner: after the last round, evaluate the last and the best policies again, on so "
+         "many fresh episodes a task",
+         Range::between(0, 1e6));
   s.bind("personal.alpha", e.personal.alpha, "personalised learning rate", Range::above(0));
   s.bind("personal.lambda", e.personal.lambda,
          "strength of the pull towards the auxiliary parameters", Range::atLeast(0));
@@ -63,7 +87,10 @@ void Experiment::bind(Settings& s) {
          "personal parameters at a round's start: the meta-policy's, or kept", {"meta", "keep"});
 
   learner_->bind(s, e.personal);
+}
 
+void Experiment::bindAggregation(Settings& s) {
+  ExperimentSettings& e = settings_;
   s.bind("aggregation.beta", e.aggregation.beta, "mixing: meta <- (1 - beta) meta + beta mean",
          Range::between(0, 1));
   s.bind("aggregation.quorum", e.aggregation.quorum,
@@ -89,9 +116,6 @@ void Experiment::bind(Settings& s) {
          "an update further than this times the median of the round's distances is left out, where "
          "there are three or more; 0: none is",
          Range::atLeast(0));
-
-  s.bind("environment.name", e.environment, "family of environments", envFamilies().names());
-  family_->bind(s);
 }
 
 }  // namespace pmeta

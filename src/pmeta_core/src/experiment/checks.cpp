@@ -19,6 +19,7 @@ std::string roundedDown(double value) {
 
 void Experiment::applyAlgorithm() {
   ExperimentSettings& e = settings_;
+  if (hasMetaLearner()) return meta_learner_->check(numTasks());
   if (algorithm_->check) algorithm_->check(e, *learner_, numTasks());
   if (algorithm_->pulls) return;
   const std::string init = evaluatesMeta() ? "meta" : "keep";
@@ -51,6 +52,7 @@ void Experiment::checkAggregation() const {
 
 void Experiment::checkStability() {
   const PersonalSettings& p = settings_.personal;
+  if (hasMetaLearner()) return;
   const std::optional<double> gamma = learner_->linearDiscount();
   const bool tabular = gamma.has_value();
   // with frozen auxiliary parameters the update is a linear map that blows up beyond these; of a

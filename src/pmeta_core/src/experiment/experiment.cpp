@@ -23,7 +23,7 @@ std::map<std::string, std::string> Experiment::definingSettings(const std::strin
   // of a model its hash counts, not where it is
   for (const char* key :
        {"results_dir", "pace", "publish_trajectories", "key_file", "checkpoint.interval",
-        "aggregation.round_timeout", "environment.model_file", "library"}) {
+        "aggregation.round_timeout", "environment.model_file", "library", "threads"}) {
     settings.erase(key);
   }
   return settings;
@@ -65,14 +65,14 @@ std::string Experiment::describe() const {
   Experiment defaults;
   defaults.family_ = envFamilies().at(settings_.environment)();
   Settings settings;
-  defaults.learner_ = learners().at(settings_.learner).make();
+  defaults.chooseKinds(settings_.algorithm, settings_.learner);
   defaults.bind(settings);
   settings.read(parseYaml(yaml_, "the settings"), "the settings");
   return settings.table(true);
 }
 
 int Experiment::quorum() const {
-  return settings_.aggregation.quorum == 0 ? numTasks() : settings_.aggregation.quorum;
+  return settings_.aggregation.quorum == 0 ? participants() : settings_.aggregation.quorum;
 }
 
 std::string Experiment::runDir() const {

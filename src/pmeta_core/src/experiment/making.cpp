@@ -10,26 +10,74 @@
 namespace pmeta {
 
 int Experiment::numTestTasks() const {
-  return evaluatesMeta() && learner_->servesTestTasks() ? family_->numTestTasks() : 0;
+  const bool serves = hasMetaLearner() || (evaluatesMeta() && learner_->servesTestTasks());
+  return serves ? family_->numTestTasks() : 0;
 }
 
 std::vector<int> Experiment::contextEpisodes() const {
   std::vector<int> counts = {0};
-  for (const int count : learner_->explorationEpisodes()) counts.push_back(count);
+  for (const int count :
+       hasMetaLearner() ? meta_learner_->explorationEpisodes() : learner_->explorationEpisodes()) {
+    counts.push_back(count);
+  }
   return counts;
 }
 
+std::int64_t Experiment::stepsPerRound() const {
+  if (settings_.steps_per_round > 0) return settings_.steps_per_round;
+  return static_cast<std::int64_t>(settings_.updates_per_round) * numTasks();
+}
+
+// names the settings of the learner that take memory
+void Experiment::refuseMemory() const {
+  const auto settings = flatSettings(parseYaml(yaml_, "the settings"));
+  const std::string section = hasMetaLearner() ? settings_.algorithm : settings_.learner;
+  std::vector<std::string> large;
+  for (const char* name :
+       {"buffer_size", "hidden", "num_envs", "batch_size", "meta_batch", "episodes"}) {
+    const auto setting = settings.find(section + "." + name);
+    if (setting != settings.end()) large.push_back(setting->first + " = " + setting->second);
+  }
+  throw Error(std::string("the learner of ") + (hasMetaLearner() ? "all tasks" : "a task") +
+              " does not fit into this machine's memory: lower " + join(large) + ".");
+}
+
+std::unique_ptr<MetaLearner> Experiment::makeMetaLearner() const {
+  try {
+    return meta_learner_->make({family_, stepsPerRound() * settings_.rounds, settings_.threads});
+  } catch (const std::bad_alloc&) {
+    refuseMemory();
+  } catch (const std::length_error&) {
+    refuseMemory();
+  }
+}
+
+Model Experiment::initialModel() const {
+  const auto seed = static_cast<std::uint64_t>(settings_.seed);
+  if (!hasMetaLearner()) return makeLearner(0)->initialModel(seed);
+  const std::unique_ptr<Env> env = family_->make(0);
+  const std::unique_ptr<PolicyFamily> policies = meta_learner_->policies(*env);
+  Model model(policies->layout());
+  Rng rng(seed, 0, Stream::kInitialise);
+  policies->initialise(model, rng);
+  return model;
+}
+
+std::unique_ptr<PolicyFamily> Experiment::policies(const Env& env) const {
+  return hasMetaLearner() ? meta_learner_->policies(env) : learner_->policies(env, numTasks());
+}
+
+const std::string& Experiment::policyFiles() const {
+  return hasMetaLearner() ? metaLearners().at(settings_.algorithm).policies
+                          : learners().at(settings_.learner).policies;
+}
+
+std::optional<std::vector<float>> Experiment::metaInput(int task) const {
+  if (hasMetaLearner()) return meta_learner_->unknownTask();
+  return learner_->metaInput(task, numTasks());
+}
+
 std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
-  const auto refuse = [&]() -> Error {
-    const auto settings = flatSettings(parseYaml(yaml_, "the settings"));
-    std::vector<std::string> large;
-    for (const char* name : {"buffer_size", "hidden", "num_envs", "batch_size"}) {
-      const auto setting = settings.find(settings_.learner + "." + name);
-      if (setting != settings.end()) large.push_back(setting->first + " = " + setting->second);
-    }
-    return Error("the learner of a task does not fit into this machine's memory: lower " +
-                 join(large) + ".");
-  };
   try {
     LearnerTask order;
     order.family = family_;
@@ -40,9 +88,9 @@ std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
     order.total_updates = static_cast<std::int64_t>(settings_.rounds) * settings_.updates_per_round;
     return std::make_unique<PersonalLearner>(learner_->make(order), settings_.personal);
   } catch (const std::bad_alloc&) {
-    throw refuse();
+    refuseMemory();
   } catch (const std::length_error&) {
-    throw refuse();
+    refuseMemory();
   }
 }
 

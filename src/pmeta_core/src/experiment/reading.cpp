@@ -1,4 +1,5 @@
 // From settings files, presets and overrides to an Experiment.
+#include <algorithm>
 #include <filesystem>
 
 #include "pmeta_core/base/error.h"
@@ -38,22 +39,62 @@ std::string peek(const std::vector<YAML::Node>& files, const std::vector<std::st
   return fallback;
 }
 
-// the file without its presets, then the chosen preset
-std::vector<YAML::Node> choosePreset(YAML::Node base, const std::string& source,
-                                     const std::vector<std::string>& overrides) {
-  const std::string chosen = peek({base}, overrides, "", "preset", "");
-  const YAML::Node presets = base["presets"];
-  // taken out in place: a clone would forget its line numbers
-  base.remove("presets");
-  // effective settings name the preset they came from, which is part of them already
-  if (chosen.empty() || (!presets && peek({base}, {}, "", "preset", "") == chosen)) return {base};
-  std::vector<std::string> known;
-  if (presets && presets.IsMap()) {
-    for (const auto& preset : presets) known.push_back(preset.first.Scalar());
-    if (presets[chosen]) return {base, presets[chosen]};
+// the group of that name, taken out in place: a clone would forget its line numbers
+YAML::Node taken(YAML::Node& from, const std::string& name) {
+  const YAML::Node group = from[name];
+  from.remove(name);
+  return group;
+}
+
+// appends what `presets` has of that name to `layers`, and all names that it has to `known`
+void choose(const YAML::Node& presets, const std::string& name, std::vector<YAML::Node>& layers,
+            std::vector<std::string>& known) {
+  if (!presets || !presets.IsMap()) return;
+  for (const auto& preset : presets) {
+    if (std::find(known.begin(), known.end(), preset.first.Scalar()) == known.end()) {
+      known.push_back(preset.first.Scalar());
+    }
   }
-  throw Error("unknown preset '" + chosen + "': " + source +
+  if (!name.empty() && presets[name]) layers.push_back(presets[name]);
+}
+
+// What a file says, each read over what is before it: the file, what it says of the algorithm, the
+// chosen preset, and the algorithm's preset of that name.
+std::vector<YAML::Node> layersOf(YAML::Node base, const std::string& source,
+                                 const std::vector<std::string>& overrides) {
+  const std::string preset = peek({base}, overrides, "", "preset", "");
+  const YAML::Node presets = taken(base, "presets");
+  const YAML::Node algorithms = taken(base, "algorithms");
+  std::vector<YAML::Node> of_preset;
+  std::vector<std::string> known;
+  choose(presets, preset, of_preset, known);
+  std::vector<YAML::Node> layers = of_preset;
+  layers.insert(layers.begin(), base);
+  const std::string algorithm =
+      peek(layers, overrides, "", "algorithm", ExperimentSettings().algorithm);
+  if (algorithms && algorithms.IsMap() && algorithms[algorithm]) {
+    YAML::Node own = algorithms[algorithm];
+    choose(taken(own, "presets"), preset, of_preset, known);
+    layers = of_preset;
+    layers.insert(layers.begin(), {base, own});
+  }
+  // effective settings name the preset they came from, which is part of them already
+  const bool effective = !presets && peek({base}, {}, "", "preset", "") == preset;
+  if (preset.empty() || !of_preset.empty() || effective) return layers;
+  throw Error("unknown preset '" + preset + "': " + source +
               (known.empty() ? " has none." : " has " + join(known) + "."));
+}
+
+// a meta-learner has none of the agents' settings: what a file says of them is for the others
+void removeAgentSettings(YAML::Node layer) {
+  if (!layer.IsMap()) return;
+  for (const char* name : {"learner", "personal", "fresh_episodes"}) layer.remove(name);
+  for (const std::string& learner : learners().names()) layer.remove(learner);
+  YAML::Node aggregation = layer["aggregation"];
+  if (!aggregation.IsMap()) return;
+  const YAML::Node timeout = aggregation["round_timeout"];
+  layer.remove("aggregation");
+  if (timeout) layer["aggregation"]["round_timeout"] = timeout;
 }
 
 // a relative path from a file of that folder; absolutePath() makes the rest of it
@@ -111,6 +152,14 @@ Experiment Experiment::resume(const std::string& run_dir, const std::vector<std:
   return experiment;
 }
 
+void Experiment::chooseKinds(const std::string& algorithm, const std::string& learner) {
+  if (const MetaLearnerRow* row = metaLearners().find(algorithm)) {
+    meta_learner_ = row->make();
+  } else {
+    learner_ = learners().at(learner).make();
+  }
+}
+
 void Experiment::anchorPaths(const std::string& folder) {
   std::vector<std::string*> paths = {&settings_.results_dir, &settings_.key_file,
                                      &settings_.library};
@@ -120,16 +169,24 @@ void Experiment::anchorPaths(const std::string& folder) {
 
 Experiment Experiment::build(const YAML::Node& root, const std::string& source,
                              const std::vector<std::string>& overrides, const std::string& folder) {
-  const std::vector<YAML::Node> files = choosePreset(root, source, overrides);
+  const YAML::Node of_algorithms = root["algorithms"];  // stays, when it is taken out
+  std::vector<YAML::Node> files = layersOf(root, source, overrides);
   // first, since it may bring what the settings name
   const std::string library =
       peek({}, overrides, "", "library", anchored(peek(files, {}, "", "library", ""), folder));
   if (!library.empty()) loadLibrary(absolutePath("library", library));
+  if (of_algorithms && of_algorithms.IsMap()) {
+    for (const auto& algorithm : of_algorithms) algorithmNamed(algorithm.first.Scalar());
+  }
   Experiment experiment;
-  experiment.learner_ =
-      learners().at(peek(files, overrides, "", "learner", experiment.settings_.learner)).make();
+  experiment.chooseKinds(peek(files, overrides, "", "algorithm", experiment.settings_.algorithm),
+                         peek(files, overrides, "", "learner", experiment.settings_.learner));
   experiment.family_ = envFamilies().at(
       peek(files, overrides, "environment", "name", experiment.settings_.environment))();
+
+  if (experiment.hasMetaLearner()) {
+    for (const YAML::Node& file : files) removeAgentSettings(file);
+  }
 
   Settings settings;
   experiment.bind(settings);
@@ -144,17 +201,22 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   const bool own_model = model != nullptr && !model->file.empty();
   if (own_model) model->file = absolutePath("environment.model_file", model->file);
   experiment.family_->build(static_cast<std::uint64_t>(e.seed));
-  if (e.aggregation.quorum > experiment.numTasks()) {
+  if (e.aggregation.quorum > experiment.participants()) {
     throw Error("aggregation.quorum is " + std::to_string(e.aggregation.quorum) +
                 " but there are " + std::to_string(experiment.numTasks()) +
                 " tasks: give at most that, or 0 for all.");
   }
-  experiment.algorithm_ = &algorithms().at(e.algorithm);
+  experiment.algorithm_ = &algorithmNamed(e.algorithm);
   experiment.applyAlgorithm();
   experiment.checkAggregation();
   experiment.checkStability();
-  experiment.learner_->setPortable(e.arithmetic == "portable");
-  experiment.learner_->check();
+  const bool portable = e.arithmetic == "portable";
+  if (experiment.hasMetaLearner()) {
+    experiment.meta_learner_->setPortable(portable);
+  } else {
+    experiment.learner_->setPortable(portable);
+    experiment.learner_->check();
+  }
   e.results_dir = expandResultsDir(e.results_dir);
   if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
   if (!e.library.empty()) e.library = absolutePath("library", e.library);

@@ -25,18 +25,23 @@ std::string divergence(const Model& model) {
 }
 
 std::string stepSizes(const Experiment& experiment) {
+  if (experiment.hasMetaLearner()) {
+    return "lower the learning rates of " + experiment.settings().algorithm +
+           ", or look at its other settings";
+  }
   const PersonalSettings& p = experiment.settings().personal;
   const std::string pull = "personal.alpha (" + formatNumber(p.alpha) + "), personal.eta (" +
                            formatNumber(p.eta) + ") or personal.lambda (" + formatNumber(p.lambda) +
                            ")";
-  if (!experiment.learner().hasNetworks()) return "lower " + pull;
+  if (!experiment.hasNetworks()) return "lower " + pull;
   return "lower personal.learning_rate (" + formatNumber(p.learning_rate) + "), " + pull;
 }
 
-std::string simulationSettings(const ExperimentSettings& settings) {
-  return "take a smaller timestep in the model (environment.model_file), or a smaller "
-         "personal.learning_rate (" +
-         formatNumber(settings.personal.learning_rate) + ")";
+std::string simulationSettings(const Experiment& experiment) {
+  const std::string timestep = "take a smaller timestep in the model (environment.model_file)";
+  if (experiment.hasMetaLearner()) return timestep;
+  return timestep + ", or a smaller personal.learning_rate (" +
+         formatNumber(experiment.settings().personal.learning_rate) + ")";
 }
 
 }  // namespace pmeta

@@ -4,7 +4,7 @@
 
 namespace pmeta {
 
-void FreshEvaluation::offer(const RoundBook::Round& round, const std::vector<TaskAgent>& agents,
+void FreshEvaluation::offer(const RoundBook::Round& round, const std::deque<TaskAgent>& agents,
                             const MetaPolicy& meta) {
   const RoundSummary& summary = round.summary;
   std::vector<Model> personal;
@@ -25,7 +25,7 @@ void FreshEvaluation::offer(const RoundBook::Round& round, const std::vector<Tas
   }
 }
 
-std::vector<FreshReturn> FreshEvaluation::evaluate(const std::vector<TaskAgent>& agents,
+std::vector<FreshReturn> FreshEvaluation::evaluate(const std::deque<TaskAgent>& agents,
                                                    int episodes, bool cross) const {
   std::vector<FreshReturn> rows;
   const int n = static_cast<int>(last_personal_.models.size());
@@ -74,7 +74,7 @@ void FreshEvaluation::saveState(StateWriter& writer) const {
   }
 }
 
-void FreshEvaluation::loadState(StateReader& reader, const std::vector<TaskAgent>& agents) {
+void FreshEvaluation::loadState(StateReader& reader, const std::deque<TaskAgent>& agents) {
   // models of the right layouts and owned entries, to be filled
   std::vector<Model> personal;
   for (const TaskAgent& agent : agents) {

@@ -73,7 +73,7 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file, int as_task
   }
   env_ = experiment_.family().make(std::max(task_, 0));
   // the layout that the settings give is known before anything of its size is allocated
-  policies_ = experiment_.learner().policies(*env_, experiment_.numTasks());
+  policies_ = experiment_.policies(*env_);
   if (model_.layout != policies_->layout()) {
     throw Error("the policy file " + path + " has parameters that do not fit its own settings.");
   }
@@ -84,7 +84,7 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file, int as_task
 std::vector<float> LoadedPolicy::taskInput(const PolicyFile& file, const std::string& path,
                                            int as_task) const {
   if (policy_ == PolicyKind::kMeta) {
-    const auto input = experiment_.learner().metaInput(as_task, experiment_.numTasks());
+    const auto input = experiment_.metaInput(as_task);
     if (input) return *input;
     throw Error("the policy file " + path +
                 " is a meta-policy that must be told its task: choose one from 0 to " +

@@ -1,11 +1,14 @@
 #include "pmeta_core/run/local_runner.h"
 
+#include <deque>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/run/meta_trainer.h"
 #include "pmeta_core/run/round_driver.h"
 #include "pmeta_core/storage/checkpoint.h"
 #include "pmeta_core/storage/policy_file.h"
@@ -25,11 +28,18 @@ class LocalRun : private RoundOutlet {
         keeps_(experiment.settings().fresh_episodes > 0),
         // nobody is late in one process
         driver_(experiment, RoundTimes(), *this, Clock::now()) {
-    for (int task = 0; task < experiment.totalTasks(); ++task)
-      agents_.emplace_back(experiment, task);
+    if (experiment.hasMetaLearner()) {
+      meta_trainer_ = std::make_unique<MetaTrainer>(experiment);
+      parties_.push_back(meta_trainer_.get());
+    } else {
+      for (int task = 0; task < experiment.totalTasks(); ++task) {
+        agents_.emplace_back(experiment, task);
+      }
+      for (TaskAgent& agent : agents_) parties_.push_back(&agent);
+    }
     folders_.emplace_back(experiment, kAggregator, meta().model.layout);
-    for (const TaskAgent& agent : agents_) {
-      if (agent.trains()) folders_.emplace_back(experiment, agent.task(), agent.layout());
+    for (const Party* party : parties_) {
+      if (party->trains()) folders_.emplace_back(experiment, party->number(), party->layout());
     }
   }
 
@@ -52,12 +62,12 @@ class LocalRun : private RoundOutlet {
   void saveCheckpoint(int round) override {
     if (log_ == nullptr) return;
     log_->sync();
-    for (std::size_t i = 1; i < folders_.size(); ++i) folders_[i].save(round, agents_[i - 1]);
+    for (std::size_t i = 1; i < folders_.size(); ++i) folders_[i].save(round, *parties_[i - 1]);
     folders_[0].save(round, *this);
   }
 
   void loadCheckpoints(int round) {
-    for (std::size_t i = 1; i < folders_.size(); ++i) folders_[i].load(round, agents_[i - 1]);
+    for (std::size_t i = 1; i < folders_.size(); ++i) folders_[i].load(round, *parties_[i - 1]);
     folders_[0].load(round, *this);
     const int taken = driver_.book().roundsTaken();
     if (driver_.round() != round || taken < round - 1 || taken > round) {
@@ -74,11 +84,7 @@ class LocalRun : private RoundOutlet {
   void savePolicies() const {
     const int round = driver_.round();
     saveRunPolicy(experiment_, PolicyKind::kMeta, -1, round, meta().model);
-    for (const TaskAgent& agent : agents_) {
-      if (!agent.trains()) continue;
-      saveRunPolicy(experiment_, PolicyKind::kPersonal, agent.task(), round, agent.personal(),
-                    agent.taskInput());
-    }
+    for (const Party* party : parties_) party->savePersonal(experiment_, round);
   }
 
   // what is the aggregator's
@@ -96,14 +102,14 @@ class LocalRun : private RoundOutlet {
  private:
   struct Fresh {
     FreshEvaluation& evaluation;
-    const std::vector<TaskAgent>& agents;
+    const std::deque<TaskAgent>& agents;
     void loadState(StateReader& reader) { evaluation.loadState(reader, agents); }
   };
 
   void train() {
-    for (TaskAgent& agent : agents_) {
-      if (!agent.trains()) continue;
-      auto trained = agent.trainRound(meta());
+    for (Party* party : parties_) {
+      if (!party->trains()) continue;
+      auto trained = party->trainRound(meta());
       if (trained->personal) driver_.add(*trained->personal);
       const MetaAggregator::Answer answer =
           driver_.offer(std::make_shared<AuxiliaryUpdate>(std::move(trained->update)));
@@ -113,8 +119,8 @@ class LocalRun : private RoundOutlet {
   }
 
   void evaluateMeta() {
-    for (TaskAgent& agent : agents_) {
-      for (const TaskReturn& result : agent.evaluateMeta(meta())) driver_.add(result);
+    for (Party* party : parties_) {
+      for (const TaskReturn& result : party->evaluateMeta(meta())) driver_.add(result);
     }
   }
 
@@ -136,8 +142,10 @@ class LocalRun : private RoundOutlet {
   RunLog* log_;
   bool keeps_;  // policies, for fresh episodes
   RoundDriver driver_;
-  std::vector<TaskAgent> agents_;          // those that train first
-  std::vector<CheckpointFolder> folders_;  // the aggregator's, then those of agents that train
+  std::deque<TaskAgent> agents_;               // those that train first
+  std::unique_ptr<MetaTrainer> meta_trainer_;  // in their place
+  std::vector<Party*> parties_;                // the ones or the other
+  std::vector<CheckpointFolder> folders_;      // the aggregator's, then those of parties that train
   FreshEvaluation fresh_;
   std::optional<RoundBook::Round> written_;  // and not given out yet
 };

@@ -15,13 +15,12 @@ MetaAggregator::MetaAggregator(const Experiment& experiment)
       rule_(experiment.rule()),
       bound_{settings_.max_update_norm, settings_.outlier_factor},
       quorum_(experiment.quorum()),
-      updates_(experiment.numTasks()),
-      norms_(experiment.numTasks(), 0),
-      counts_(experiment.numTasks()) {
+      updates_(experiment.participants()),
+      norms_(experiment.participants(), 0),
+      counts_(experiment.participants()) {
   meta_.run_id = experiment.settings().run_id;
   meta_.settings_hash = experiment.settingsHash();
-  meta_.model = experiment.makeLearner(0)->initialModel(
-      static_cast<std::uint64_t>(experiment.settings().seed));
+  meta_.model = experiment.initialModel();
 }
 
 MetaAggregator::Answer MetaAggregator::offer(std::shared_ptr<const AuxiliaryUpdate> update) {

@@ -1,24 +1,15 @@
 #include "pmeta_core/run/task_agent.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/stopwatch.h"
+#include "pmeta_core/storage/policy_file.h"
 
 namespace pmeta {
 namespace {
-
-class Stopwatch {
- public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 // of the last round's log weight, what stays in this one's
 constexpr double kWeightMemory = 0.8;
@@ -31,7 +22,7 @@ TaskAgent::TaskAgent(const Experiment& experiment, int task)
       settings_hash_(experiment.settingsHash()),
       name_("task " + std::to_string(task) + " (" + experiment.family().taskName(task) + ")"),
       step_sizes_(stepSizes(experiment)),
-      simulation_settings_(simulationSettings(experiment.settings())),
+      simulation_settings_(simulationSettings(experiment)),
       seed_(static_cast<std::uint64_t>(experiment.settings().seed)),
       task_(task),
       split_(experiment.isTestTask(task) ? Split::kTest : Split::kTrain),
@@ -58,8 +49,8 @@ auto TaskAgent::guarded(int round, const Work& work) const {
   }
 }
 
-std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& meta,
-                                                            const KeepGoing& keep_going) {
+std::optional<RoundResult> TaskAgent::trainRound(const MetaPolicy& meta,
+                                                 const KeepGoing& keep_going) {
   if (!trains()) throw Error("task " + std::to_string(task_) + " is a test task: not trained on.");
   checkModel(meta.model, learner_->layout(), "the aggregator");
   const Stopwatch watch;
@@ -132,7 +123,7 @@ void TaskAgent::fail(int round, const std::string& what, const std::string& advi
                    ".");
 }
 
-TaskAgent::RoundResult TaskAgent::lastResult() const {
+RoundResult TaskAgent::lastResult() const {
   RoundResult result = last_;
   result.update = {run_id_, task_, round_, sent(), std::exp(log_weight_), settings_hash_};
   return result;
@@ -223,37 +214,19 @@ void TaskAgent::loadState(StateReader& reader) {
   between_ = true;
 }
 
-void TaskAgent::RoundResult::saveState(StateWriter& writer) const {
-  writer.count("env_steps", env_steps);
-  writer.count("updates", updates);
-  writer.count("broken_episodes", broken_episodes);
-  writer.value("loss", loss);
-  writer.value("distance", distance);
-  writer.flag("evaluated", personal.has_value());
-  if (personal) writer.part("personal", *personal);
+void TaskAgent::savePersonal(const Experiment& experiment, int round) const {
+  if (!trains()) return;
+  saveRunPolicy(experiment, PolicyKind::kPersonal, task_, round, personal(), taskInput());
 }
 
-void TaskAgent::RoundResult::loadState(StateReader& reader) {
-  env_steps = reader.count("env_steps");
-  updates = reader.count("updates");
-  broken_episodes = reader.count("broken_episodes");
-  loss = reader.value<double>("loss");
-  distance = reader.value<double>("distance");
-  personal.reset();
-  if (reader.flag("evaluated")) reader.part("personal", personal.emplace());
-}
-
-Episode TaskAgent::recordPersonal() const {
+std::optional<Episode> TaskAgent::recordPersonal() const {
   Rng rng = evaluationRng();
   return learner_->record(learner_->personal(), rng);
 }
 
-Episode TaskAgent::recordMeta(const MetaPolicy& meta) const {
+Episode TaskAgent::recordMeta(const MetaPolicy& meta, int) const {
   checkModel(meta.model, learner_->layout(), "the aggregator");
-  if (meta.round != adapted_round_) {
-    throw Error("the meta-policy of round " + std::to_string(meta.round) +
-                " has not been evaluated: do that before recording an episode of it.");
-  }
+  if (meta.round != adapted_round_) refuseUnevaluated(meta);
   Rng rng = evaluationRng();
   return learner_->recordAdapted(meta.model, adapted_, rng);
 }

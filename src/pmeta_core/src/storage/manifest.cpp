@@ -53,7 +53,7 @@ Json curves(const Experiment& experiment) {
     found.push_back(
         {{"policy", name(policy)}, {"split", name(split)}, {"context_episodes", context_episodes}});
   };
-  add(PolicyKind::kPersonal, Split::kTrain, 0);
+  if (!experiment.hasMetaLearner()) add(PolicyKind::kPersonal, Split::kTrain, 0);
   if (!experiment.evaluatesMeta()) return found;
   for (const Split split : {Split::kTrain, Split::kTest}) {
     if (split == Split::kTest && experiment.numTestTasks() == 0) continue;
@@ -62,18 +62,30 @@ Json curves(const Experiment& experiment) {
   return found;
 }
 
+// pmeta, averaging, independent, pooled; then meta-learners by name
+int orderOf(const Experiment& experiment) {
+  const Algorithm& algorithm = experiment.algorithm();
+  if (!experiment.hasMetaLearner()) {
+    return !algorithm.pulls + !algorithm.shares + algorithm.pools_environments;
+  }
+  const std::vector<std::string> names = metaLearners().names();
+  const auto found = std::find(names.begin(), names.end(), experiment.settings().algorithm);
+  return 4 + static_cast<int>(found - names.begin());
+}
+
 Json figures(const Experiment& experiment) {
   const Algorithm& algorithm = experiment.algorithm();
-  const bool averages = algorithm.shares && !algorithm.pulls;
+  const bool at_once = experiment.hasMetaLearner();
+  const bool averages = algorithm.shares && !algorithm.pulls && !at_once;
   Json found;
   found["label"] = algorithm.label;
-  found["order"] = !algorithm.pulls + !algorithm.shares + algorithm.pools_environments;
+  found["order"] = orderOf(experiment);
   found["baseline"] = !algorithm.pulls;
   found["reference_line"] = averages;
-  found["compared_by"] = name(averages ? PolicyKind::kMeta : PolicyKind::kPersonal);
+  found["compared_by"] = name(averages || at_once ? PolicyKind::kMeta : PolicyKind::kPersonal);
   found["own_settings"] = algorithm.pulls ? kPull : std::vector<std::string>();
   found["fixed_settings"] = fixedSettings(experiment, algorithm);
-  found["policies"] = learners().at(experiment.settings().learner).policies;
+  found["policies"] = experiment.policyFiles();
   found["curves"] = curves(experiment);
   return found;
 }
@@ -128,7 +140,7 @@ std::int64_t manifestCount(const std::string& run_dir, const char* key) {
 
 std::string otherMachine(const Experiment& experiment) {
   // tables have no matrix products; portable ones are the same everywhere
-  if (!experiment.learner().hasNetworks()) return "";
+  if (!experiment.hasNetworks()) return "";
   const bool portable = experiment.settings().arithmetic == "portable";
   const Json before = entryOf(experiment.runDir(), "machine");
   if (before.is_null()) return "";

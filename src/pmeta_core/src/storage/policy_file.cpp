@@ -298,10 +298,10 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment, 
   const ExperimentSettings& settings = experiment.settings();
   const auto env = experiment.family().make(policy == PolicyKind::kMeta ? 0 : task);
   const EnvSpec& spec = env->spec();
-  const PolicyForm form = experiment.learner().policies(*env, experiment.numTasks())->form();
+  const PolicyForm form = experiment.policies(*env)->form();
   std::map<std::string, std::string> metadata = {
       {"environment", settings.environment},
-      {"learner", settings.learner},
+      {"learner", experiment.hasMetaLearner() ? settings.algorithm : settings.learner},
       {"policy", name(policy)},
       {"round", std::to_string(round)},
       {"run_id", settings.run_id},

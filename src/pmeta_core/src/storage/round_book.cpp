@@ -31,6 +31,7 @@ RoundBook::RoundBook(const Experiment& experiment)
       contexts_(experiment.contextEpisodes()),
       evaluations_(experiment.evaluationSchedule()),
       rounds_(experiment.settings().rounds),
+      expects_personal_(!experiment.hasMetaLearner()),
       expects_meta_(experiment.evaluatesMeta()),
       run_id_(experiment.settings().run_id),
       env_steps_(experiment.totalTasks(), 0),
@@ -48,7 +49,8 @@ bool RoundBook::add(const TaskReturn& result) {
   const bool known_context =
       personal ? result.context_episodes == 0
                : std::count(contexts_.begin(), contexts_.end(), result.context_episodes) > 0;
-  if (tests != (result.split == Split::kTest) || (tests && personal) || !known_context) {
+  if (tests != (result.split == Split::kTest) || (personal && (tests || !expects_personal_)) ||
+      !known_context) {
     return false;
   }
   const auto key =
@@ -128,7 +130,7 @@ bool RoundBook::Open::hasMeta(int task, const std::vector<int>& contexts) const 
 bool RoundBook::isComplete(int round, const Open& open) const {
   if (!open.closed) return false;
   if (!evaluations_.includes(round)) return true;
-  for (int task = 0; task < num_tasks_; ++task) {
+  for (int task = 0; expects_personal_ && task < num_tasks_; ++task) {
     if (open.reported(task) && !open.hasPersonal(task)) return false;
   }
   for (int task = 0; expects_meta_ && task < total_tasks_; ++task) {
@@ -165,7 +167,7 @@ std::vector<RoundBook::Round> RoundBook::take(bool force) {
 }
 
 bool RoundBook::hasPersonal(int round) const {
-  if (!evaluations_.includes(round)) return true;
+  if (!expects_personal_ || !evaluations_.includes(round)) return true;
   const auto it = open_.find(round);
   if (it == open_.end()) return false;
   for (int task = 0; task < num_tasks_; ++task) {
@@ -180,7 +182,7 @@ std::vector<int> RoundBook::awaited() const {
   const auto it = open_.find(next_);
   // a closed round does without the personal returns of those it missed
   const auto owesPersonal = [&](int task) {
-    if (task >= num_tasks_) return false;
+    if (task >= num_tasks_ || !expects_personal_) return false;
     return it == open_.end() || !it->second.closed || it->second.reported(task);
   };
   for (int task = 0; task < total_tasks_; ++task) {

@@ -1,7 +1,8 @@
-#include "agent/task_agent_node.h"
+#include "agent/party_node.h"
 #include "common/private_param.h"
 #include "common/run_node.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/run/task_agent.h"
 
 namespace {
 
@@ -24,7 +25,13 @@ int runAgent(const pmeta::Experiment& experiment) {
   const int task = pmeta_nodes::privateIndex("task", -1, experiment.totalTasks() - 1);
   if (task < 0) throw pmeta::Error("which task? Give the private parameter task, e.g. _task:=0.");
   const bool resume = pmeta_nodes::privateFlag("resume", false);
-  return pmeta_nodes::TaskAgentNode(experiment, task, resume).spin();
+  if (experiment.hasMetaLearner()) {
+    throw pmeta::Error("algorithm " + experiment.settings().algorithm +
+                       " has no agents: all tasks are learnt by the node meta_learner.");
+  }
+  const auto make = [&] { return std::make_unique<pmeta::TaskAgent>(experiment, task); };
+  return pmeta_nodes::PartyNode(experiment, make, experiment.family().taskName(task), resume)
+      .spin();
 }
 
 }  // namespace

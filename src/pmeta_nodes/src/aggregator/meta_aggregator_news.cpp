@@ -103,10 +103,11 @@ void MetaAggregatorNode::reportHealth() {
                            {"rounds in all", std::to_string(summary_.rounds)},
                            {"broken episodes", std::to_string(driver_->book().brokenEpisodes())},
                            {"refused", std::to_string(summary_.refused)}};
-  for (int task = 0; task < experiment_.numTasks(); ++task) {
-    const auto& counts = driver_->aggregator().counts()[task];
+  for (int party = 0; party < experiment_.participants(); ++party) {
+    const auto& counts = driver_->aggregator().counts()[party];
     health_report_.values.emplace_back(
-        experiment_.family().taskName(task),
+        experiment_.hasMetaLearner() ? experiment_.settings().algorithm
+                                     : experiment_.family().taskName(party),
         std::to_string(counts.accepted) + " accepted, " + std::to_string(counts.duplicate) +
             " duplicate, " + std::to_string(counts.stale) + " stale, " +
             std::to_string(counts.refused) + " refused, " + std::to_string(counts.excluded) +

@@ -37,7 +37,8 @@ constexpr char kHelp[] =
   rosrun pmeta_nodes prepare_run --check LAUNCH_FILE CONFIG [key:=value ...]
 
 CONFIG         settings file; with resume:=RUN_DIR the run there goes on, with its own settings
-AGENTS_LAUNCH  launch file to write: a task_agent for each training and test task (unless agents:=false),
+AGENTS_LAUNCH  launch file to write: a task_agent for each training and test task, or the
+               meta_learner of algorithms that have one (unless agents:=false),
                with record:=true rosbag, and the settings as the parameters below `settings`
 LAUNCH_FILE    launch file of pMeta's: checks what it is to be called with, and prints the run's folder and
                how many agents it has
@@ -121,13 +122,28 @@ Launch takeLaunch(std::vector<std::string>& assignments) {
   return launch;
 }
 
+/// A node that trains.
+struct PartyNode {
+  std::string name, type;
+  int task = -1;  ///< that it is to be told; -1: none
+};
+
+std::vector<PartyNode> partyNodes(const Experiment& experiment) {
+  if (experiment.hasMetaLearner()) return {{"meta_learner", "meta_learner"}};
+  std::vector<PartyNode> nodes;
+  for (int task = 0; task < experiment.totalTasks(); ++task) {
+    nodes.push_back({"task_agent_" + std::to_string(task), "task_agent", task});
+  }
+  return nodes;
+}
+
 // a master ends the node that has a name when another one takes it
 void requireFreeNames(const Experiment& experiment, const Launch& launch) {
   std::vector<std::string> names = {"run_guard", "meta_aggregator"};
   if (launch.view) names.push_back("trajectory_view");
   if (launch.record) names.push_back("recorder");
-  for (int task = 0; task < experiment.totalTasks() && launch.agents; ++task) {
-    names.push_back("task_agent_" + std::to_string(task));
+  if (launch.agents) {
+    for (const PartyNode& node : partyNodes(experiment)) names.push_back(node.name);
   }
   for (std::string& name : names) name = launch.ns + "/" + name;
   const std::string master = pmeta_nodes::launchMaster();
@@ -180,11 +196,12 @@ std::string agentsLaunch(const Experiment& experiment, const Launch& launch) {
   xml << "<launch>\n"
       << "  <rosparam ns=\"settings\" subst_value=\"false\">\n"
       << escapeXml(parameterYaml(experiment)) << "  </rosparam>\n";
-  for (int task = 0; task < experiment.totalTasks() && launch.agents; ++task) {
-    xml << "  <node name=\"task_agent_" << task
-        << "\" pkg=\"pmeta_nodes\" type=\"task_agent\" respawn=\"true\" respawn_delay=\"1\">\n"
-        << "    <param name=\"task\" value=\"" << task << "\"/>\n"
-        << "    <param name=\"resume\" value=\"true\"/>\n"
+  for (const PartyNode& node : partyNodes(experiment)) {
+    if (!launch.agents) break;
+    xml << "  <node name=\"" << node.name << "\" pkg=\"pmeta_nodes\" type=\"" << node.type
+        << "\" respawn=\"true\" respawn_delay=\"1\">\n";
+    if (node.task >= 0) xml << "    <param name=\"task\" value=\"" << node.task << "\"/>\n";
+    xml << "    <param name=\"resume\" value=\"true\"/>\n"
         << "  </node>\n";
   }
   if (launch.record) {
@@ -242,7 +259,7 @@ int check(const std::vector<std::string>& words) {
       {words.begin() + 2, words.end()}, pmeta_nodes::readLaunchFile(words[0])));
   takeLaunch(assignments);
   const Experiment experiment = checkedExperiment(words[1], assignments);
-  std::cout << experiment.runDir() << "\n" << experiment.totalTasks() << "\n";
+  std::cout << experiment.runDir() << "\n" << partyNodes(experiment).size() << "\n";
   return 0;
 }
 

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "pmeta_core/base/registry.h"
 #include "pmeta_core/experiment/experiment_settings.h"
@@ -33,7 +34,14 @@ struct Algorithm {
       check = {};
 };
 
-/// Every algorithm, by the name that `algorithm` gives.
+/// Every algorithm of agents, by the name that `algorithm` gives; metaLearners() has the others.
 Registry<Algorithm>& algorithms();
+
+/// Names of all that `algorithm` may give.
+std::vector<std::string> algorithmNames();
+
+/// What agents and aggregator do by that name; of a meta-learner, that its one model is the
+/// meta-policy. Throws Error if there is none of that name.
+const Algorithm& algorithmNamed(const std::string& name);
 
 }  // namespace pmeta

@@ -11,6 +11,7 @@
 #include "pmeta_core/aggregate/aggregation_rule.h"
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/base/settings.h"
+#include "pmeta_core/baselines/meta_learner.h"
 #include "pmeta_core/env/env.h"
 #include "pmeta_core/experiment/algorithm.h"
 #include "pmeta_core/experiment/experiment_settings.h"
@@ -49,7 +50,6 @@ class Experiment {
                            const std::string& of_config = "");
 
   const ExperimentSettings& settings() const { return settings_; }
-  const LearnerKind& learner() const { return *learner_; }
   const EnvFamily& family() const { return *family_; }
   int numTasks() const { return family_->numTasks(); }  ///< that are trained on
   int numTestTasks() const;  ///< that only the meta-policy is evaluated on, numbered after those
@@ -58,6 +58,13 @@ class Experiment {
 
   const Algorithm& algorithm() const { return *algorithm_; }
   bool evaluatesMeta() const { return algorithm_->shares; }
+  /// Is there one learner of all tasks, in which their trajectories meet, in the place of agents?
+  /// Then there are no personal policies.
+  bool hasMetaLearner() const { return meta_learner_ != nullptr; }
+  /// How many parties send an update each round: one for each training task, or the meta-learner.
+  int participants() const { return hasMetaLearner() ? 1 : numTasks(); }
+  /// Transitions of a meta-learner's round, over all training tasks.
+  std::int64_t stepsPerRound() const;
   bool keepsPersonal() const { return settings_.personal.personal_init == "keep"; }
   EvaluationSchedule evaluationSchedule() const {
     return {settings_.evaluation_interval, settings_.rounds};
@@ -71,8 +78,24 @@ class Experiment {
   /// inference network.
   std::vector<int> contextEpisodes() const;
 
-  /// Throws Error, which names the settings, if it does not fit into memory.
+  /// What learns a task. Throws Error, which names the settings, if it does not fit into memory.
   std::unique_ptr<PersonalLearner> makeLearner(int task) const;
+  /// What learns all tasks, where hasMetaLearner(). Throws as makeLearner().
+  std::unique_ptr<MetaLearner> makeMetaLearner() const;
+  /// Episodes of one evaluation of a meta-learner's policy.
+  int metaEvaluationEpisodes() const { return meta_learner_->evaluationEpisodes(); }
+  /// The parameters that every party begins with.
+  Model initialModel() const;
+
+  /// Policies for the environment `env`, which must outlive them.
+  std::unique_ptr<PolicyFamily> policies(const Env& env) const;
+  /// What policy files hold: see manifest.h.
+  const std::string& policyFiles() const;
+  /// What tells a meta-policy that has not explored to act on `task`; nothing if it must be told a
+  /// training task and `task` is none.
+  std::optional<std::vector<float>> metaInput(int task) const;
+  /// Are the policies networks, not tables?
+  bool hasNetworks() const { return hasMetaLearner() || learner_->hasNetworks(); }
 
   /// The best return any policy can have on the task, where it can be computed (tabular tasks).
   /// The first call computes those of all tasks, which takes minutes on grids of 512 x 512.
@@ -122,7 +145,11 @@ class Experiment {
                           const std::vector<std::string>& overrides, const std::string& folder);
   static std::map<std::string, std::string> definingSettings(const std::string& yaml);
   void anchorPaths(const std::string& folder);
+  void chooseKinds(const std::string& algorithm, const std::string& learner);
   void bind(Settings& settings);
+  void bindLearning(Settings& settings);
+  void bindAggregation(Settings& settings);
+  [[noreturn]] void refuseMemory() const;
   void applyAlgorithm();
   void checkAggregation() const;
   void checkStability();
@@ -130,7 +157,8 @@ class Experiment {
   ExperimentSettings settings_;
   const Algorithm* algorithm_ = nullptr;
   std::map<std::string, std::shared_ptr<AggregationRule>> rules_;  // with their settings
-  std::shared_ptr<LearnerKind> learner_;
+  std::shared_ptr<LearnerKind> learner_;                           // of the agents, or null
+  std::shared_ptr<MetaLearnerKind> meta_learner_;                  // or null
   std::shared_ptr<EnvFamily> family_;
   std::shared_ptr<Optima> optima_ = std::make_shared<Optima>();
   std::string yaml_;

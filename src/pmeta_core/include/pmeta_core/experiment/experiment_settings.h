@@ -35,12 +35,14 @@ struct ExperimentSettings {
   std::string learner = "q_learning";  ///< a name of learners()
   std::string arithmetic = "native";   ///< of networks: native or portable
   std::int64_t seed = 0;
-  int rounds = 10;              ///< C
-  int updates_per_round = 3;    ///< R
-  int evaluation_interval = 1;  ///< rounds from one evaluation to the next
-  std::string results_dir;      ///< "" means $ROS_HOME/pmeta, by default ~/.ros/pmeta
-  std::string run_id;           ///< "" means one made of the start time, algorithm and seed
-  double pace = 0;              ///< least seconds between rounds, to watch a fast experiment
+  int rounds = 10;                   ///< C
+  int updates_per_round = 3;         ///< R
+  std::int64_t steps_per_round = 0;  ///< meta-learners: transitions a round; 0: R times the tasks
+  int threads = 1;                   ///< meta-learners: that act in environments at the same time
+  int evaluation_interval = 1;       ///< rounds from one evaluation to the next
+  std::string results_dir;           ///< "" means $ROS_HOME/pmeta, by default ~/.ros/pmeta
+  std::string run_id;                ///< "" means one made of the start time, algorithm and seed
+  double pace = 0;                   ///< least seconds between rounds, to watch a fast experiment
   bool publish_trajectories = true;
   int checkpoint_interval = 0;  ///< rounds from one checkpoint to the next; 0: none
   std::string key_file;         ///< of the key that messages are authenticated with; "" for none

@@ -23,6 +23,6 @@ std::string divergence(const Model& model);
 std::string stepSizes(const Experiment& experiment);
 
 /// What to do where the simulation breaks down.
-std::string simulationSettings(const ExperimentSettings& settings);
+std::string simulationSettings(const Experiment& experiment);
 
 }  // namespace pmeta

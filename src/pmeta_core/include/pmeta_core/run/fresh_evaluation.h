@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <limits>
 #include <string>
 #include <vector>
@@ -31,17 +32,17 @@ class FreshEvaluation {
  public:
   /// A round is complete: its record, the agents as they are (training tasks first), and the
   /// meta-policy it gave.
-  void offer(const RoundBook::Round& round, const std::vector<TaskAgent>& agents,
+  void offer(const RoundBook::Round& round, const std::deque<TaskAgent>& agents,
              const MetaPolicy& meta);
 
   /// Every kept policy on at least `episodes` episodes a task. `cross`: personal policies on the
   /// other tasks too.
-  std::vector<FreshReturn> evaluate(const std::vector<TaskAgent>& agents, int episodes,
+  std::vector<FreshReturn> evaluate(const std::deque<TaskAgent>& agents, int episodes,
                                     bool cross) const;
 
   /// The policies kept so far. Loading needs the agents, in the same order.
   void saveState(StateWriter& writer) const;
-  void loadState(StateReader& reader, const std::vector<TaskAgent>& agents);
+  void loadState(StateReader& reader, const std::deque<TaskAgent>& agents);
 
   /// The rows as CSV, with a header.
   static std::string csv(const std::vector<FreshReturn>& rows);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -9,54 +8,30 @@
 #include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/messages/protocol.h"
 #include "pmeta_core/run/divergence.h"
+#include "pmeta_core/run/party.h"
 
 namespace pmeta {
 
-/// One task's side of the algorithm: trains its personalised policy round by round. Knows no ROS.
-class TaskAgent {
+/// One task's side of the algorithm: trains its personalised policy round by round.
+class TaskAgent : public Party {
  public:
-  /// What one round of training gives.
-  struct RoundResult {
-    AuxiliaryUpdate update;
-    std::optional<TaskReturn> personal;  ///< in rounds that evaluate; counts all since the last
-                                         ///< scheduled one
-    std::int64_t env_steps = 0;          ///< of this round
-    std::int64_t updates = 0;            ///< of this round
-    double loss = 0;                     ///< of the last update
-    std::vector<Loss> losses;            ///< all there are of it; none after loadState()
-    std::int64_t broken_episodes = 0;    ///< of this round's training
-    double distance = 0;                 ///< ||phi - omega_meta|| over the task's own entries
-
-    /// All but the update, which follows from the agent's state.
-    void saveState(StateWriter& writer) const;
-    void loadState(StateReader& reader);
-  };
-
-  /// Called after each update with the number done in this round; false stops training.
-  using KeepGoing = std::function<bool(int updates_done)>;
-
   TaskAgent(const Experiment& experiment, int task);
 
   int task() const { return task_; }
-  bool trains() const { return split_ == Split::kTrain; }  ///< a test task only evaluates
-  const ModelLayout& layout() const { return learner_->layout(); }
+  int number() const override { return task_; }
+  std::vector<int> tasks() const override { return {task_}; }
+  bool trains() const override { return split_ == Split::kTrain; }  ///< a test task only evaluates
+  const ModelLayout& layout() const override { return learner_->layout(); }
+  std::int64_t workPerRound() const override { return updates_per_round_; }
 
   /// One round from `meta`: reset, R updates, and evaluation of the personal policy where
-  /// Experiment::evaluationSchedule() has it, or `meta` asks for it. Nothing if stopped. Throws
-  /// Error if the meta-policy does not fit, and TaskFailed if ten episodes running broke down, or
-  /// anything of the result is not finite: nothing of it may be sent.
-  ///
-  /// An evaluation outside the schedule changes nothing that training or scheduled ones see.
-  ///
-  /// The round trained last is not trained again: asked for it once more, also after loadState(),
-  /// it gives the same result. So an agent that ended between saving and sending sends what it
-  /// owes.
-  std::optional<RoundResult> trainRound(const MetaPolicy& meta, const KeepGoing& keep_going = {});
+  /// Experiment::evaluationSchedule() has it, or `meta` asks for it; an evaluation outside the
+  /// schedule changes nothing that training or scheduled ones see.
+  std::optional<RoundResult> trainRound(const MetaPolicy& meta,
+                                        const KeepGoing& keep_going = {}) override;
 
-  /// The meta-policy on this task: one return for each of Experiment::contextEpisodes(), or none
-  /// in a round that does not evaluate and where `meta` does not ask for it. Throws as trainRound()
-  /// does.
-  std::vector<TaskReturn> evaluateMeta(const MetaPolicy& meta);
+  std::vector<TaskReturn> evaluateMeta(const MetaPolicy& meta) override;
+  Episode recordMeta(const MetaPolicy& meta, int task) const override;
 
   /// A policy on this task, on at least `episodes` episodes that no round evaluates; a meta-policy
   /// after the most exploration episodes it is evaluated after.
@@ -66,23 +41,12 @@ class TaskAgent {
   /// What tells the personal policy its task beside the observations; empty if nothing does.
   std::vector<float> taskInput() const { return learner_->taskInput(learner_->personal()); }
 
-  /// Episodes that broke down so far, in training and in the evaluations of rounds.
-  std::int64_t brokenEpisodes() const { return broken_episodes_; }
-
-  /// The round trained last; 0 before the first.
-  int round() const { return round_; }
-
-  /// All that its later rounds depend on: of the learner, counters, weight, and the last result. To
-  /// be called between two rounds, where no generator is alive; throws Error after a round that was
-  /// stopped, or for a test task, which has no state.
-  void saveState(StateWriter& writer) const;
-  void loadState(StateReader& reader);
-
-  /// One greedy episode, from the same start whatever the policy and round.
-  Episode recordPersonal() const;
-  /// The first episode behind the last return that evaluateMeta() gave of this meta-policy: after
-  /// the most exploration. Throws Error if the last call was of another round's, or none.
-  Episode recordMeta(const MetaPolicy& meta) const;
+  std::int64_t brokenEpisodes() const override { return broken_episodes_; }
+  int round() const override { return round_; }
+  void saveState(StateWriter& writer) const override;
+  void loadState(StateReader& reader) override;
+  std::optional<Episode> recordPersonal() const override;
+  void savePersonal(const Experiment& experiment, int round) const override;
 
  private:
   bool train(int round, const KeepGoing& keep_going, RoundResult& result);

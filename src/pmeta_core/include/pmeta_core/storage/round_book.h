@@ -36,8 +36,8 @@ class RoundBook {
   /// counters that no run reaches.
   bool add(const TaskReturn& result);
 
-  /// Round `round` has been aggregated: personal returns of its participants and of the excluded,
-  /// and meta returns of all tasks are due.
+  /// Round `round` has been aggregated: personal returns of its participants and of the excluded
+  /// (unless a meta-learner has learnt all tasks), and meta returns of all tasks are due.
   void closeRound(int round, const std::vector<int>& participants, const std::vector<int>& missing,
                   double seconds, const std::vector<int>& excluded = {});
 
@@ -76,6 +76,7 @@ class RoundBook {
   std::vector<int> contexts_;
   EvaluationSchedule evaluations_;
   int rounds_;
+  bool expects_personal_;
   bool expects_meta_;
   std::string run_id_;
   std::map<int, Open> open_;

@@ -1,4 +1,4 @@
-#include "agent/task_agent_node.h"
+#include "agent/party_node.h"
 
 #include <ros/callback_queue.h>
 
@@ -28,57 +28,55 @@ constexpr std::uint32_t kMetaPolicies = 8;
 
 }  // namespace
 
-TaskAgentNode::TaskAgentNode(const pmeta::Experiment& experiment, int task, bool resume)
+PartyNode::PartyNode(const pmeta::Experiment& experiment, MakeParty make, const std::string& name,
+                     bool resume)
     : experiment_(experiment),
       settings_hash_(experiment.settingsHash()),
       resume_(resume),
-      agent_(experiment, task),
-      checkpoints_(experiment, task, agent_.layout()),
+      make_(std::move(make)),
+      name_(name),
+      party_(make_()),
+      checkpoints_(experiment, party_->number(), party_->layout()),
+      tasks_(party_->tasks()),
       authenticator_(experiment.settings().key_file) {
   status_.run_id = experiment.settings().run_id;
-  status_.task = static_cast<std::uint32_t>(task);
-  status_.task_name = experiment.family().taskName(task);
-  status_.updates_per_round = static_cast<std::uint32_t>(experiment.settings().updates_per_round);
+  status_.updates_per_round = static_cast<std::uint32_t>(party_->workPerRound());
 
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
-  const std::string trajectory = "task_" + std::to_string(task) + "/trajectory";
+  const auto tasks = static_cast<std::uint32_t>(tasks_.size());
   auxiliary_pub_ = nh_.advertise<pmeta_msgs::AuxiliaryUpdate>("auxiliary", 4);
   // latching would keep only the last one for late viewers: they get both policies', of two rounds
   returns_pub_ = nh_.advertise<pmeta_msgs::TaskReturn>(
-      "returns", 16, [this](const ros::SingleSubscriberPublisher& viewer) {
+      "returns", 16 * tasks, [this](const ros::SingleSubscriberPublisher& viewer) {
         const std::lock_guard<std::mutex> lock(mutex_);
         for (const auto& recent : recent_returns_) {
           for (const auto& result : recent.second.all()) viewer.publish(*result);
         }
       });
-  status_pub_ = nh_.advertise<AgentStatus>("agent_status", 4, true);
+  status_pub_ = nh_.advertise<AgentStatus>("agent_status", 4 * tasks, true);
   if (experiment.settings().publish_trajectories) {
-    // latching would keep only the last policy's episode for late viewers: they get both
-    trajectory_pub_ = nh_.advertise<pmeta_msgs::Trajectory>(
-        trajectory, 4, [this](const ros::SingleSubscriberPublisher& viewer) {
-          const std::lock_guard<std::mutex> lock(mutex_);
-          for (const auto& episode : last_episodes_) viewer.publish(episode.second);
-        });
+    for (const int task : tasks_) advertiseEpisodes(task);
   }
   setState(AgentStatus::WAITING, "waiting for a meta-policy");
-  meta_sub_ =
-      nh_.subscribe("meta_policy", kMetaPolicies, &TaskAgentNode::onMetaPolicy, this, hints);
-  round_sub_ = nh_.subscribe("round", 4, &TaskAgentNode::onRound, this, hints);
+  meta_sub_ = nh_.subscribe("meta_policy", kMetaPolicies, &PartyNode::onMetaPolicy, this, hints);
+  round_sub_ = nh_.subscribe("round", 4, &PartyNode::onRound, this, hints);
   status_timer_ = nh_.createWallTimer(ros::WallDuration(0.5),
                                       [this](const ros::WallTimerEvent&) { publishStatus(); });
   resend_timer_ =
       nh_.createWallTimer(ros::WallDuration(0.5), [this](const ros::WallTimerEvent&) { resend(); });
-  health_ = std::make_unique<Health>(status_.task_name, "task agent", [this] { return health(); });
+  health_ =
+      std::make_unique<Health>(name_, experiment.hasMetaLearner() ? "meta-learner" : "task agent",
+                               [this] { return health(); });
   trainer_ = std::thread([this] { train(); });
 }
 
-TaskAgentNode::~TaskAgentNode() {
+PartyNode::~PartyNode() {
   stop_ = true;
   mailbox_.close();
   if (trainer_.joinable()) trainer_.join();
 }
 
-int TaskAgentNode::spin() {
+int PartyNode::spin() {
   Clock::time_point alone_since = Clock::now();
   while (!stopRequested() && !failed_) {
     ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
@@ -91,7 +89,7 @@ int TaskAgentNode::spin() {
   return failed_ || gave_up_ ? 1 : 0;
 }
 
-bool TaskAgentNode::isAuthentic(const std::string& kind, pmeta::Authenticity authenticity) {
+bool PartyNode::isAuthentic(const std::string& kind, pmeta::Authenticity authenticity) {
   const std::string forgery = refusals_.judge(kind, authenticity);
   if (forgery.empty()) return true;
   if (!refusals_.mayTell()) return false;
@@ -105,7 +103,7 @@ bool TaskAgentNode::isAuthentic(const std::string& kind, pmeta::Authenticity aut
   return false;
 }
 
-void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::Ptr& msg) {
+void PartyNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::Ptr& msg) {
   if (!isAuthentic("a meta-policy", authenticate(authenticator_, *msg))) return;
   if (msg->run_id != status_.run_id) {
     ROS_WARN_THROTTLE(10, "ignoring a meta-policy of run %s; this agent belongs to %s.",
@@ -140,7 +138,7 @@ void TaskAgentNode::onMetaPolicy(const pmeta_msgs::MetaPolicy::Ptr& msg) {
   mailbox_.push(msg);
 }
 
-void TaskAgentNode::onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
+void PartyNode::onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
   if (!isAuthentic("a round message", authenticate(authenticator_, *msg))) return;
   if (msg->run_id != status_.run_id) return;
   if (authenticator_.hasKey() && !news_.take(msg->header.stamp)) {
@@ -156,7 +154,7 @@ void TaskAgentNode::onRound(const pmeta_msgs::RoundSummary::ConstPtr& msg) {
   unconfirmed_updates_.clear();
 }
 
-void TaskAgentNode::train() {
+void PartyNode::train() {
   try {
     while (!stop_ && !gave_up_) {
       const auto msg = mailbox_.pop(std::chrono::seconds(1));
@@ -181,23 +179,24 @@ void TaskAgentNode::train() {
   }
 }
 
-void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
+void PartyNode::trainFrom(const pmeta::MetaPolicy& meta) {
   const int rounds = experiment_.settings().rounds;
   waitForAggregator();
   if (meta.round > 0 && experiment_.evaluatesMeta() &&
       (meta.evaluate || experiment_.evaluationSchedule().includes(meta.round))) {
     setState(AgentStatus::EVALUATING,
              "evaluating the meta-policy of round " + std::to_string(meta.round));
-    for (const pmeta::TaskReturn& result : agent_.evaluateMeta(meta)) deliver(result);
-    if (trajectory_pub_)
-      publishEpisode(agent_.recordMeta(meta), meta.round, pmeta::PolicyKind::kMeta);
+    for (const pmeta::TaskReturn& result : party_->evaluateMeta(meta)) deliver(result);
+    for (const auto& [task, publisher] : trajectory_pubs_) {
+      publishEpisode(party_->recordMeta(meta, task), task, meta.round, pmeta::PolicyKind::kMeta);
+    }
   }
   if (meta.round >= rounds) {
     setState(AgentStatus::DONE, "all " + std::to_string(rounds) + " rounds are done");
     return;
   }
 
-  if (!agent_.trains()) {
+  if (!party_->trains()) {
     setState(AgentStatus::WAITING,
              "test task: waiting for the meta-policy of round " + std::to_string(meta.round + 1));
     return;
@@ -213,7 +212,7 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
   setState(AgentStatus::TRAINING, "training round " + std::to_string(round));
   const Clock::time_point start = Clock::now();
   if (!round_end_) round_end_ = start;
-  auto result = agent_.trainRound(meta, [this](int done) {
+  auto result = party_->trainRound(meta, [this](std::int64_t done) {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.update = static_cast<std::uint32_t>(done);
     return !stop_;
@@ -233,7 +232,7 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
       status_.loss_names.push_back(loss.name);
       status_.losses.push_back(loss.value);
     }
-    status_.broken_episodes = static_cast<std::uint64_t>(agent_.brokenEpisodes());
+    status_.broken_episodes = static_cast<std::uint64_t>(party_->brokenEpisodes());
     status_.distance_to_meta = result->distance;
     status_.train_s = std::chrono::duration<double>(end - start).count();
   }
@@ -242,39 +241,42 @@ void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
   if (round == rounds) savePersonal();
   if (result->personal) deliver(*result->personal);
   deliver(std::move(result->update));
-  if (trajectory_pub_ && result->personal) {
-    publishEpisode(agent_.recordPersonal(), round, pmeta::PolicyKind::kPersonal);
+  if (!trajectory_pubs_.empty() && result->personal) {
+    if (const auto episode = party_->recordPersonal()) {
+      publishEpisode(*episode, party_->number(), round, pmeta::PolicyKind::kPersonal);
+    }
   }
   setState(AgentStatus::WAITING, "waiting for the meta-policy of round " + std::to_string(round));
 }
 
 // whoever has just been started, or has run ahead of the meta-policy, goes where that is
-void TaskAgentNode::returnTo(const pmeta::MetaPolicy& meta) {
-  const int have = agent_.round();
+void PartyNode::returnTo(const pmeta::MetaPolicy& meta) {
+  const int have = party_->round();
   const bool ahead = have > meta.round + 1;
   // at round 0 too: it may have ended between saving and sending round 1
   const bool started = have == 0 && resume_;
   if (!ahead && !started) return;
   std::vector<std::string> refused;
-  const auto fresh = [this]() -> pmeta::TaskAgent& {
-    agent_ = pmeta::TaskAgent(experiment_, agent_.task());
-    return agent_;
+  const auto fresh = [this]() -> pmeta::Party& {
+    party_.reset();  // two might not fit into the memory
+    party_ = make_();
+    return *party_;
   };
   const int round = checkpoints_.loadNewest(meta.round + 1, fresh, refused);
   for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
   saved_round_ = round;
-  if (round > 0) ROS_INFO("%s goes on after round %d.", status_.task_name.c_str(), round);
+  if (round > 0) ROS_INFO("%s goes on after round %d.", name_.c_str(), round);
   if (round < meta.round) {
     ROS_WARN("%s has lost what it learnt in the rounds %d to %d: no good checkpoint is newer.",
-             status_.task_name.c_str(), round + 1, meta.round);
+             name_.c_str(), round + 1, meta.round);
   }
 }
 
-void TaskAgentNode::saveCheckpoint(int round) {
+void PartyNode::saveCheckpoint(int round) {
   if (round == saved_round_) return;
   std::string trouble;
   try {
-    checkpoints_.save(round, agent_);
+    checkpoints_.save(round, *party_);
     saved_round_ = round;
   } catch (const pmeta::Error& error) {
     // training goes on: what is at stake is only how much a crash would cost
@@ -285,17 +287,16 @@ void TaskAgentNode::saveCheckpoint(int round) {
   checkpoint_trouble_ = trouble;
 }
 
-void TaskAgentNode::savePersonal() const {
+void PartyNode::savePersonal() const {
   try {
-    pmeta::saveRunPolicy(experiment_, pmeta::PolicyKind::kPersonal, agent_.task(),
-                         experiment_.settings().rounds, agent_.personal(), agent_.taskInput());
+    party_->savePersonal(experiment_, experiment_.settings().rounds);
   } catch (const pmeta::Error& error) {
     // the others can do without this machine's file
     ROS_ERROR("the personal policy is not kept: %s", error.what());
   }
 }
 
-void TaskAgentNode::waitForAggregator() {
+void PartyNode::waitForAggregator() {
   const ros::WallTime limit = ros::WallTime::now() + ros::WallDuration(kAggregatorWait);
   while (!stop_ && ros::WallTime::now() < limit &&
          (auxiliary_pub_.getNumSubscribers() == 0 || returns_pub_.getNumSubscribers() == 0)) {
@@ -303,19 +304,20 @@ void TaskAgentNode::waitForAggregator() {
   }
 }
 
-void TaskAgentNode::deliver(const pmeta::TaskReturn& result) {
-  pmeta_msgs::TaskReturn msg = toMsg(result, status_.task_name);
+void PartyNode::deliver(const pmeta::TaskReturn& result) {
+  pmeta_msgs::TaskReturn msg = toMsg(result, experiment_.family().taskName(result.task));
   msg.header.stamp = ros::Time::now();
   sign(authenticator_, msg);
   returns_pub_.publish(msg);
   const std::lock_guard<std::mutex> lock(mutex_);
-  recent_returns_[result.policy].take(boost::make_shared<const pmeta_msgs::TaskReturn>(msg));
+  recent_returns_[{result.task, result.policy}].take(
+      boost::make_shared<const pmeta_msgs::TaskReturn>(msg));
   unconfirmed_returns_.push_back(std::move(msg));
   resend_wait_ = kFirstResend;
   next_resend_ = Clock::now() + resend_wait_;
 }
 
-void TaskAgentNode::deliver(pmeta::AuxiliaryUpdate update) {
+void PartyNode::deliver(pmeta::AuxiliaryUpdate update) {
   pmeta_msgs::AuxiliaryUpdate msg = toMsg(std::move(update));
   msg.header.stamp = ros::Time::now();
   sign(authenticator_, msg);
@@ -326,16 +328,28 @@ void TaskAgentNode::deliver(pmeta::AuxiliaryUpdate update) {
   next_resend_ = Clock::now() + resend_wait_;
 }
 
-void TaskAgentNode::publishEpisode(const pmeta::Episode& episode, int round,
-                                   pmeta::PolicyKind policy) {
-  pmeta_msgs::Trajectory msg = toMsg(episode, experiment_, agent_.task(), round, policy);
-  msg.header.stamp = ros::Time::now();
-  trajectory_pub_.publish(msg);
-  const std::lock_guard<std::mutex> lock(mutex_);
-  last_episodes_[policy] = std::move(msg);
+// latching would keep only the last policy's episode for late viewers: they get both
+void PartyNode::advertiseEpisodes(int task) {
+  trajectory_pubs_[task] = nh_.advertise<pmeta_msgs::Trajectory>(
+      "task_" + std::to_string(task) + "/trajectory", 4,
+      [this, task](const ros::SingleSubscriberPublisher& viewer) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        for (const auto& [of, episode] : last_episodes_) {
+          if (of.first == task) viewer.publish(episode);
+        }
+      });
 }
 
-void TaskAgentNode::resend() {
+void PartyNode::publishEpisode(const pmeta::Episode& episode, int task, int round,
+                               pmeta::PolicyKind policy) {
+  pmeta_msgs::Trajectory msg = toMsg(episode, experiment_, task, round, policy);
+  msg.header.stamp = ros::Time::now();
+  trajectory_pubs_.at(task).publish(msg);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  last_episodes_[{task, policy}] = std::move(msg);
+}
+
+void PartyNode::resend() {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (unconfirmed_returns_.empty() && unconfirmed_updates_.empty()) return;
   if (Clock::now() < next_resend_) return;
@@ -346,7 +360,7 @@ void TaskAgentNode::resend() {
   next_resend_ = Clock::now() + resend_wait_;
 }
 
-void TaskAgentNode::setState(std::uint8_t state, const std::string& message) {
+void PartyNode::setState(std::uint8_t state, const std::string& message) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.state = state;
@@ -355,16 +369,20 @@ void TaskAgentNode::setState(std::uint8_t state, const std::string& message) {
   publishStatus();
 }
 
-void TaskAgentNode::publishStatus() {
+void PartyNode::publishStatus() {
   const std::lock_guard<std::mutex> lock(mutex_);
   status_.header.stamp = ros::Time::now();
   status_.state_name = stateName(status_);
   status_.incarnation = incarnation_;
-  sign(authenticator_, status_);
-  status_pub_.publish(status_);
+  for (const int task : tasks_) {
+    status_.task = static_cast<std::uint32_t>(task);
+    status_.task_name = experiment_.family().taskName(task);
+    sign(authenticator_, status_);
+    status_pub_.publish(status_);
+  }
 }
 
-HealthReport TaskAgentNode::health() {
+HealthReport PartyNode::health() {
   const std::lock_guard<std::mutex> lock(mutex_);
   HealthReport report;
   report.level = status_.state == AgentStatus::FAILED ? HealthReport::kError

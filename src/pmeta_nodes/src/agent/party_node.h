@@ -10,12 +10,14 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "common/health.h"
@@ -24,28 +26,33 @@
 #include "common/recent_returns.h"
 #include "common/refusals.h"
 #include "pmeta_core/experiment/experiment.h"
-#include "pmeta_core/run/task_agent.h"
+#include "pmeta_core/run/party.h"
 #include "pmeta_core/security/authentication.h"
 #include "pmeta_core/storage/checkpoint.h"
 
 namespace pmeta_nodes {
 
-/// A TaskAgent on ROS: a training thread fed with the newest meta-policy, and the topics around it.
+/// A Party on ROS, an agent or the meta-learner: a training thread fed with the newest meta-policy,
+/// and the topics around it.
 ///
 /// Subscribes to meta_policy and round; publishes auxiliary, returns, agent_status and
-/// task_<i>/trajectory. What the aggregator must get is sent again until a newer meta-policy, or
-/// the end of the run, shows that it has it. With a key_file, what it sends is signed and what is
-/// not authentic it ignores. A checkpoint is on the disk before that round's update is sent, so an
-/// agent that is killed comes back with all that anybody has seen of it; where the aggregator had
-/// to go back some rounds, the agent follows. Training that cannot go on (TaskFailed) is told by
-/// the state FAILED until the run has ended: the same would come of it if it were started again.
-/// The last round's personal policy stays on this machine, as policies/task_<i>.safetensors of the
-/// run folder.
-class TaskAgentNode {
+/// task_<i>/trajectory, the latter two for each of its tasks. What the aggregator must get is sent
+/// again until a newer meta-policy, or the end of the run, shows that it has it. With a key_file,
+/// what it sends is signed and what is not authentic it ignores. A checkpoint is on the disk before
+/// that round's update is sent, so an agent that is killed comes back with all that anybody has
+/// seen of it; where the aggregator had to go back some rounds, the agent follows. Training that
+/// cannot go on (TaskFailed) is told by the state FAILED until the run has ended: the same would
+/// come of it if it were started again. The last round's personal policy stays on this machine, as
+/// policies/task_<i>.safetensors of the run folder.
+class PartyNode {
  public:
-  /// resume: begin with the newest checkpoint in the run folder, if there is one.
-  TaskAgentNode(const pmeta::Experiment& experiment, int task, bool resume);
-  ~TaskAgentNode();
+  using MakeParty = std::function<std::unique_ptr<pmeta::Party>()>;
+
+  /// make: gives the party as it is before round 1. name: of its health. resume: begin with the
+  /// newest checkpoint in the run folder, if there is one.
+  PartyNode(const pmeta::Experiment& experiment, MakeParty make, const std::string& name,
+            bool resume);
+  ~PartyNode();
 
   /// Spins until stopped, or until some seconds after the run has ended. Returns the exit code.
   int spin();
@@ -65,7 +72,8 @@ class TaskAgentNode {
   void waitForAggregator();
   void deliver(const pmeta::TaskReturn& result);
   void deliver(pmeta::AuxiliaryUpdate update);
-  void publishEpisode(const pmeta::Episode& episode, int round, pmeta::PolicyKind policy);
+  void advertiseEpisodes(int task);
+  void publishEpisode(const pmeta::Episode& episode, int task, int round, pmeta::PolicyKind policy);
   void setState(std::uint8_t state, const std::string& message);
   void publishStatus();
   void resend();
@@ -74,16 +82,19 @@ class TaskAgentNode {
   const pmeta::Experiment& experiment_;
   const std::string settings_hash_;
   const bool resume_;
-  pmeta::TaskAgent agent_;  ///< the trainer's, as are the three below
+  const MakeParty make_;
+  const std::string name_;
+  std::unique_ptr<pmeta::Party> party_;  ///< the trainer's, as are the three below
   pmeta::CheckpointFolder checkpoints_;
   int saved_round_ = 0;
   std::optional<Clock::time_point> round_end_;  ///< of the last round that was trained
+  const std::vector<int> tasks_;                ///< the party's
   const pmeta::Authenticator authenticator_;
   ros::NodeHandle nh_;
   ros::Publisher auxiliary_pub_;
   ros::Publisher returns_pub_;
   ros::Publisher status_pub_;
-  ros::Publisher trajectory_pub_;
+  std::map<int, ros::Publisher> trajectory_pubs_;  ///< by task; none if they are not published
   ros::Subscriber meta_sub_;
   ros::Subscriber round_sub_;
   ros::WallTimer status_timer_;
@@ -98,12 +109,13 @@ class TaskAgentNode {
   Refusals refusals_;  ///< the spinning thread's, as is news_
   NewsOrder news_;     ///< of messages about the run's state
 
-  std::mutex mutex_;  ///< guards what follows
-  pmeta_msgs::AgentStatus status_;
+  std::mutex mutex_;                ///< guards what follows
+  pmeta_msgs::AgentStatus status_;  ///< but for the task
   std::vector<pmeta_msgs::TaskReturn> unconfirmed_returns_;
   std::vector<pmeta_msgs::AuxiliaryUpdate> unconfirmed_updates_;
-  std::map<pmeta::PolicyKind, pmeta_msgs::Trajectory> last_episodes_;
-  std::map<pmeta::PolicyKind, RecentReturns> recent_returns_;
+  using OfTask = std::pair<int, pmeta::PolicyKind>;
+  std::map<OfTask, pmeta_msgs::Trajectory> last_episodes_;
+  std::map<OfTask, RecentReturns> recent_returns_;
   Clock::time_point next_resend_;
   std::chrono::seconds resend_wait_{2};
   int newest_round_ = -1;
