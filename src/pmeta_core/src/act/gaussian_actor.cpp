@@ -6,14 +6,15 @@
 namespace pmeta {
 
 GaussianActor::GaussianActor(const Mlp& network, std::vector<float> task_input,
-                             std::size_t max_batch, By by, const float* parameters)
+                             std::size_t max_batch, By by, const float* parameters,
+                             float min_log_std)
     : network_(network),
       task_input_(std::move(task_input)),
       by_(by),
       parameters_(parameters),
       workspace_(network, max_batch),
       input_(max_batch * network.inputs()),
-      policy_(network.outputs() / 2, 1) {}
+      policy_(network.outputs() / 2, 1, min_log_std) {}
 
 void GaussianActor::look(const float* observations, const std::vector<std::size_t>& envs) {
   const std::size_t observation_size = network_.inputs() - task_input_.size();

@@ -7,8 +7,9 @@
 
 namespace pmeta {
 
-GaussianPolicy::GaussianPolicy(std::size_t action_size, std::size_t max_batch)
+GaussianPolicy::GaussianPolicy(std::size_t action_size, std::size_t max_batch, float min_log_std)
     : action_size_(action_size),
+      min_log_std_(min_log_std),
       mean_(max_batch * action_size),
       log_std_(mean_),
       noise_(mean_),
@@ -30,7 +31,7 @@ void GaussianPolicy::sampleWith(const float* heads, std::size_t batch, const flo
     std::copy_n(row, action_size_, &mean_[b * action_size_]);
     std::copy_n(row + action_size_, action_size_, &log_std_[b * action_size_]);
   }
-  kernels().tanhGaussian(mean_.data(), log_std_.data(), noise, kMinLogStd, kMaxLogStd,
+  kernels().tanhGaussian(mean_.data(), log_std_.data(), noise, min_log_std_, kMaxLogStd,
                          action_.data(), deviation_.data(), log_density_.data(),
                          batch * action_size_);
   for (std::size_t b = 0; b < batch; ++b) {
@@ -50,11 +51,29 @@ void GaussianPolicy::backward(std::size_t batch, const float* d_action, float d_
       const float a = action_[k];
       // by u: da/du = 1 - a^2, and -log(1 - a^2) has the slope 2 a
       const float d_u = d_action[k] * (1 - a * a) + d_log_prob * (2 * a);
-      const bool inside = log_std_[k] >= kMinLogStd && log_std_[k] <= kMaxLogStd;
       d_mean[j] = d_u;
-      d_log_std[j] = inside ? d_u * deviation_[k] - d_log_prob : 0;
+      d_log_std[j] = isInside(log_std_[k]) ? d_u * deviation_[k] - d_log_prob : 0;
     }
   }
+}
+
+double GaussianPolicy::addPenalty(std::size_t batch, double weight, float* d_heads) const {
+  const double each = weight / static_cast<double>(batch * action_size_);
+  const auto slope = static_cast<float>(2 * each);
+  double squares = 0;
+  for (std::size_t b = 0; b < batch; ++b) {
+    float* d_mean = d_heads + 2 * b * action_size_;
+    float* d_log_std = d_mean + action_size_;
+    for (std::size_t j = 0; j < action_size_; ++j) {
+      const std::size_t k = b * action_size_ + j;
+      const float mean = mean_[k];
+      const float log_std = std::min(std::max(log_std_[k], min_log_std_), kMaxLogStd);
+      squares += static_cast<double>(mean) * mean + static_cast<double>(log_std) * log_std;
+      d_mean[j] += slope * mean;
+      if (isInside(log_std_[k])) d_log_std[j] += slope * log_std;
+    }
+  }
+  return each * squares;
 }
 
 void meanActions(const float* heads, std::size_t batch, std::size_t action_size, double* actions) {

@@ -24,7 +24,7 @@ LatentAdaptation::LatentAdaptation(const SacNetworks& networks, const ContextSet
       workspace_(encoder_, static_cast<std::size_t>(settings.batch_size)),
       acting_(networks.actor(), std::vector<float>(encoder_.latentSize()), 1,
               settings.exploration_noise ? GaussianActor::By::kSample : GaussianActor::By::kMean,
-              parameters),
+              parameters, networks.minLogStd()),
       noise_(encoder_.latentSize()),
       action_(networks.actionSize()) {
   episodeOver();

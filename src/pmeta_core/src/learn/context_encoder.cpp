@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "pmeta_core/base/error.h"
 
@@ -29,12 +30,7 @@ MlpSpec encoderNetwork(std::size_t inputs, const ContextSettings& settings) {
 }  // namespace
 
 void bind(Settings& s, const std::string& prefix, ContextSettings& c) {
-  s.bind(prefix + "context_hidden", c.hidden, "units of each hidden layer of the context encoder",
-         Range::between(1, 65536));
-  s.bind(prefix + "latent_size", c.latent_size, "length of the task vector z",
-         Range::between(1, 1000));
-  s.bind(prefix + "context_batch", c.batch_size,
-         "transitions of one context, from which one z is inferred", Range::between(1, 1e6));
+  bindEncoder(s, prefix, c);
   s.bind(prefix + "context_buffer", c.buffer_size, "recent context transitions kept",
          Range::between(1, 1e9));
   s.bind(prefix + "context_window", c.window,
@@ -44,24 +40,40 @@ void bind(Settings& s, const std::string& prefix, ContextSettings& c) {
   s.bind(prefix + "contexts_per_update", c.per_update,
          "contexts of one update, each giving its z to an equal part of the batch",
          Range::between(1, 1e6));
+  s.bind(prefix + "prior_interval", c.prior_interval,
+         "every how-many-th training episode acts on z from the prior and becomes context",
+         Range::between(1, 1e6));
+  s.bind(prefix + "context_explorer", c.explorer,
+         "who acts on z from the prior: meta (the meta-policy, as at test time) or personal",
+         {"meta", "personal"});
+}
+
+void bindEncoder(Settings& s, const std::string& prefix, ContextSettings& c) {
+  s.bind(prefix + "context_hidden", c.hidden, "units of each hidden layer of the context encoder",
+         Range::between(1, 65536));
+  s.bind(prefix + "latent_size", c.latent_size, "length of the task vector z",
+         Range::between(1, 1000));
+  s.bind(prefix + "context_batch", c.batch_size,
+         "transitions of one context, from which one z is inferred", Range::between(1, 1e6));
   s.bind(prefix + "context_symlog", c.symlog,
          "the encoder sees sign(x) ln(1 + |x|) of every number in a context");
   s.bind(prefix + "kl_weight", c.kl_weight, "weight of the divergence of q(z|c) from the prior",
          Range::atLeast(0));
   s.bind(prefix + "context_next_observation", c.next_observation,
          "contexts hold next observations; for tasks that differ in dynamics");
-  s.bind(prefix + "prior_interval", c.prior_interval,
-         "every how-many-th training episode acts on z from the prior and becomes context",
-         Range::between(1, 1e6));
   s.bind(prefix + "context_posterior", c.posterior_episodes,
-         "the other episodes, on z from q(z|c), become context as well");
-  s.bind(prefix + "context_explorer", c.explorer,
-         "who acts on z from the prior: meta (the meta-policy, as at test time) or personal",
-         {"meta", "personal"});
+         "training episodes on z from q(z|c), too, become context");
   s.bind(prefix + "exploration_episodes", c.exploration_episodes,
          "episodes at test time before z is fixed", Range::between(1, 1000));
   s.bind(prefix + "exploration_noise", c.exploration_noise,
          "these act by samples of the policy instead of its mean");
+}
+
+void check(const ContextSettings& context, const std::string& prefix) {
+  const std::vector<int>& counts = context.exploration_episodes;
+  if (std::adjacent_find(counts.begin(), counts.end(), std::greater_equal<int>()) != counts.end()) {
+    throw Error(prefix + "exploration_episodes must be ascending, e.g. [5, 15].");
+  }
 }
 
 double klToPrior(const LatentPosterior& posterior) {

@@ -1,5 +1,7 @@
 #include "pmeta_core/learn/sac_networks.h"
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -37,6 +39,20 @@ MlpSpec network(const char* prefix, const SacSettings& settings, std::size_t inp
   return spec;
 }
 
+void initialiseAsRlkit(const Mlp& network, float* parameters, double last, Rng& rng) {
+  const std::vector<Block>& blocks = network.blocks();
+  for (std::size_t l = 0; l < blocks.size(); l += 2) {
+    const Block &weight = blocks[l], &bias = blocks[l + 1];
+    const bool is_last = l + 2 == blocks.size();
+    const double bound = is_last ? last : 1 / std::sqrt(static_cast<double>(weight.shape[0]));
+    const std::size_t drawn = weight.size() + (is_last ? bias.size() : 0);
+    for (std::size_t k = 0; k < drawn; ++k) {
+      *parameters++ = static_cast<float>(bound * (2 * rng.uniform() - 1));
+    }
+    if (!is_last) parameters = std::fill_n(parameters, bias.size(), 0.1f);
+  }
+}
+
 }  // namespace
 
 std::vector<float> oneHot(int task, int num_tasks) {
@@ -52,10 +68,15 @@ SacNetworks::SacNetworks(const EnvSpec& env, const SacSettings& settings, int nu
     : observation_size_(static_cast<std::size_t>(requireContinuous(env).observation_size)),
       action_size_(static_cast<std::size_t>(env.action_size)),
       task_input_size_(taskInputs(settings, num_tasks)),
+      min_log_std_(static_cast<float>(settings.min_log_std)),
+      as_rlkit_(settings.initialisation == "rlkit"),
       actor_(network("actor", settings, observation_size_ + task_input_size_, 2 * action_size_)),
       critic1_(
           network("critic1", settings, observation_size_ + task_input_size_ + action_size_, 1)),
       critic2_(network("critic2", settings, critic1_.inputs(), 1)) {
+  if (settings.backbone == "value") {
+    value_.emplace(network("value", settings, actor_.inputs(), 1));
+  }
   if (settings.task_encoding == "inference") {
     encoder_.emplace(env.observation_size, env.action_size, settings.context);
   }
@@ -73,14 +94,23 @@ std::vector<Block> SacNetworks::blocks() const {
   append(actor_);
   append(critic1_);
   append(critic2_);
+  if (hasValue()) append(*value_);
   if (hasEncoder()) append(encoder_->network());
   return all;
 }
 
 void SacNetworks::initialise(float* parameters, Rng& rng) const {
-  actor_.initialise(parameters, rng);
-  for (int k = 0; k < 2; ++k) critic(k).initialise(parameters + criticOffset(k), rng);
-  if (hasEncoder()) encoder_->network().initialise(parameters + encoderOffset(), rng);
+  const auto draw = [&](const Mlp& network, std::size_t offset, double last) {
+    if (as_rlkit_) {
+      initialiseAsRlkit(network, parameters + offset, last, rng);
+    } else {
+      network.initialise(parameters + offset, rng);
+    }
+  };
+  draw(actor_, 0, 1e-3);
+  for (int k = 0; k < 2; ++k) draw(critic(k), criticOffset(k), 3e-3);
+  if (hasValue()) draw(*value_, valueOffset(), 3e-3);
+  if (hasEncoder()) draw(encoder_->network(), encoderOffset(), 3e-3);
 }
 
 SacPolicies::SacPolicies(const EnvSpec& env, const SacSettings& settings, int num_tasks)

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/learn/sac_losses.h"
 #include "pmeta_core/nn/kernels.h"
 
 namespace pmeta {
@@ -29,19 +30,23 @@ SacUpdate::SacUpdate(const SacNetworks& networks, const SacSettings& settings,
       reward_scale_(settings.reward_scale),
       tau_(settings.tau),
       kl_weight_(settings.context.kl_weight),
+      head_penalty_(settings.head_penalty),
       batch_(static_cast<std::size_t>(settings.batch_size)),
       observation_size_(networks.observationSize()),
       action_size_(networks.actionSize()),
       task_input_(std::move(task_input)),
       temperature_(settings.temperature, static_cast<int>(action_size_)),
-      targets_(networks_.critic(0).size() + networks_.critic(1).size()),
-      actor_workspace_(networks_.actor(), 2 * batch_),
-      policy_(action_size_, 2 * batch_),
+      targets_(networks_.hasValue() ? networks_.value().size()
+                                    : networks_.critic(0).size() + networks_.critic(1).size()),
+      policy_rows_(networks_.hasValue() ? batch_ : 2 * batch_),
+      actor_workspace_(networks_.actor(), policy_rows_),
+      policy_(action_size_, policy_rows_, networks_.minLogStd()),
       actor_input_(2 * batch_ * networks_.actor().inputs()),
       critic_input_(batch_ * networks_.critic(0).inputs()),
       next_critic_input_(critic_input_),
       rewards_(batch_),
       discounts_(batch_),
+      soft_values_(batch_),
       y_(batch_),
       errors_(batch_),
       d_q_(batch_),
@@ -54,6 +59,10 @@ SacUpdate::SacUpdate(const SacNetworks& networks, const SacSettings& settings,
     critic_workspaces_.emplace_back(networks_.critic(k), batch_);
     minimum_rows_[k].reserve(batch_);
   }
+  if (networks_.hasValue()) {
+    value_workspace_.emplace(networks_.value(), batch_);
+    gradient_.resize(std::max(gradient_.size(), networks_.value().size()));
+  }
   if (contexts == 0) return;
   const ContextEncoder& encoder = networks_.encoder();
   for (std::size_t k = 0; k < contexts; ++k) tasks_.emplace_back(encoder, settings.context);
@@ -63,6 +72,10 @@ SacUpdate::SacUpdate(const SacNetworks& networks, const SacSettings& settings,
 }
 
 void SacUpdate::resetTargets(const float* parameters) {
+  if (networks_.hasValue()) {
+    std::copy_n(parameters + networks_.valueOffset(), targets_.size(), targets_.begin());
+    return;
+  }
   for (int k = 0; k < 2; ++k) {
     std::copy_n(parameters + networks_.criticOffset(k), networks_.critic(k).size(), target(k));
   }
@@ -90,13 +103,15 @@ SacLosses SacUpdate::apply(const float* parameters, Optimizer<float>& optimizer,
   for (InferredTask& task : tasks_) std::fill(task.d_z.begin(), task.d_z.end(), 0.0f);
   // one pass for the actions in s' and in s: the actor does not move before its own step
   const float* heads =
-      networks_.actor().forward(parameters, actor_input_.data(), 2 * batch_, actor_workspace_);
-  policy_.sample(heads, 2 * batch_, rng);
+      networks_.actor().forward(parameters, actor_input_.data(), policy_rows_, actor_workspace_);
+  policy_.sample(heads, policy_rows_, rng);
   computeTargets();
 
   SacLosses losses;
   for (int k = 0; k < 2; ++k) losses.critic += 0.5 * updateCritic(k, parameters, optimizer);
   if (networks_.hasEncoder()) losses.kl = updateEncoder(parameters, optimizer);
+  judgeActions(parameters);
+  if (networks_.hasValue()) losses.value = updateValue(parameters, optimizer);
   losses.actor = updateActor(parameters, optimizer);
 
   double mean_log_prob = 0;
@@ -110,23 +125,31 @@ SacLosses SacUpdate::apply(const float* parameters, Optimizer<float>& optimizer,
 }
 
 void SacUpdate::computeTargets() {
+  const float* next_values = soft_values_.data();
+  if (networks_.hasValue()) {
+    next_values = networks_.value().forward(targets_.data(),
+                                            &actor_input_[batch_ * networks_.actor().inputs()],
+                                            batch_, *value_workspace_);
+  } else {
+    putActions(policy_.actions() + batch_ * action_size_, next_critic_input_);
+    const float* q[2];
+    for (int k = 0; k < 2; ++k) {
+      q[k] = networks_.critic(k).forward(target(k), next_critic_input_.data(), batch_,
+                                         critic_workspaces_[static_cast<std::size_t>(k)]);
+    }
+    softValues(q[0], q[1], policy_.logProbs() + batch_, static_cast<float>(temperature_.value()),
+               batch_, soft_values_.data());
+  }
+  criticTargets(rewards_.data(), discounts_.data(), next_values, static_cast<float>(reward_scale_),
+                batch_, y_.data());
+}
+
+// as the last inputs of each row
+void SacUpdate::putActions(const float* actions, AlignedFloats& critic_input) const {
   const std::size_t row = networks_.critic(0).inputs();
-  const float* next_actions = policy_.actions() + batch_ * action_size_;
   for (std::size_t b = 0; b < batch_; ++b) {
-    std::copy_n(next_actions + b * action_size_, action_size_,
-                &next_critic_input_[(b + 1) * row - action_size_]);
-  }
-  const float* q[2];
-  for (int k = 0; k < 2; ++k) {
-    q[k] = networks_.critic(k).forward(target(k), next_critic_input_.data(), batch_,
-                                       critic_workspaces_[static_cast<std::size_t>(k)]);
-  }
-  const float* log_prob = policy_.logProbs() + batch_;
-  const auto alpha = static_cast<float>(temperature_.value());
-  const auto scale = static_cast<float>(reward_scale_);
-  for (std::size_t b = 0; b < batch_; ++b) {
-    const float smaller = q[0][b] <= q[1][b] ? q[0][b] : q[1][b];
-    y_[b] = scale * rewards_[b] + discounts_[b] * (smaller - alpha * log_prob[b]);
+    std::copy_n(actions + b * action_size_, action_size_,
+                &critic_input[(b + 1) * row - action_size_]);
   }
 }
 
@@ -145,7 +168,8 @@ double SacUpdate::updateCritic(int k, const float* parameters, Optimizer<float>&
     float* d_z = taskOf(b).d_z.data();
     for (std::size_t j = 0; j < latent; ++j) d_z[j] += d_latent_rows_[b * latent + j];
   }
-  optimizer.apply(networks_.criticOffset(k), gradient_.data(), critic.size(), target(k), tau_);
+  optimizer.apply(networks_.criticOffset(k), gradient_.data(), critic.size(),
+                  networks_.hasValue() ? nullptr : target(k), tau_);
   return loss;
 }
 
@@ -166,34 +190,45 @@ double SacUpdate::updateEncoder(const float* parameters, Optimizer<float>& optim
   return kl;
 }
 
-double SacUpdate::updateActor(const float* parameters, Optimizer<float>& optimizer) {
-  const std::size_t row = networks_.critic(0).inputs();
-  for (std::size_t b = 0; b < batch_; ++b) {
-    std::copy_n(policy_.actions() + b * action_size_, action_size_,
-                &critic_input_[(b + 1) * row - action_size_]);
-  }
-  const float* q[2];
+// by the critics that have moved
+void SacUpdate::judgeActions(const float* parameters) {
+  putActions(policy_.actions(), critic_input_);
   for (int k = 0; k < 2; ++k) {
-    q[k] = networks_.critic(k).forward(parameters + networks_.criticOffset(k), critic_input_.data(),
-                                       batch_, critic_workspaces_[static_cast<std::size_t>(k)]);
+    q_[k] =
+        networks_.critic(k).forward(parameters + networks_.criticOffset(k), critic_input_.data(),
+                                    batch_, critic_workspaces_[static_cast<std::size_t>(k)]);
     minimum_rows_[k].clear();
   }
+  for (std::size_t b = 0; b < batch_; ++b) minimum_rows_[q_[0][b] <= q_[1][b] ? 0 : 1].push_back(b);
+}
+
+double SacUpdate::updateValue(const float* parameters, Optimizer<float>& optimizer) {
+  const Mlp& value = networks_.value();
+  const float* theta = parameters + networks_.valueOffset();
+  softValues(q_[0], q_[1], policy_.logProbs(), static_cast<float>(temperature_.value()), batch_,
+             soft_values_.data());
+  const float* v = value.forward(theta, actor_input_.data(), batch_, *value_workspace_);
+  for (std::size_t b = 0; b < batch_; ++b) errors_[b] = v[b] - soft_values_[b];
+  const double loss = kernels().squaredLoss(errors_.data(), nullptr, d_q_.data(), batch_);
+  value.backward(theta, actor_input_.data(), batch_, d_q_.data(), gradient_.data(), nullptr,
+                 *value_workspace_);
+  optimizer.apply(networks_.valueOffset(), gradient_.data(), value.size(), targets_.data(), tau_);
+  return loss;
+}
+
+double SacUpdate::updateActor(const float* parameters, Optimizer<float>& optimizer) {
   const double alpha = temperature_.value();
-  double loss = 0;
-  for (std::size_t b = 0; b < batch_; ++b) {
-    const int k = q[0][b] <= q[1][b] ? 0 : 1;
-    minimum_rows_[k].push_back(b);
-    loss += alpha * policy_.logProbs()[b] - q[k][b];
-  }
+  double loss = actorLoss(q_[0], q_[1], policy_.logProbs(), alpha, batch_);
   const auto n = static_cast<float>(batch_);
   std::fill(d_q_.begin(), d_q_.end(), -1 / n);
   for (int k = 0; k < 2; ++k) actionGradient(k, parameters);
 
   policy_.backward(batch_, d_action_.data(), static_cast<float>(alpha) / n, d_heads_.data());
+  if (head_penalty_ > 0) loss += policy_.addPenalty(batch_, head_penalty_, d_heads_.data());
   networks_.actor().backward(parameters, actor_input_.data(), batch_, d_heads_.data(),
                              gradient_.data(), nullptr, actor_workspace_);
   optimizer.apply(0, gradient_.data(), networks_.actor().size());
-  return loss / static_cast<double>(batch_);
+  return loss;
 }
 
 // gradient by the actions of those samples whose smaller critic is k

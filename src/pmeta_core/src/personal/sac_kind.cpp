@@ -1,9 +1,6 @@
-#include <algorithm>
-#include <functional>
 #include <utility>
 
 #include "pmeta_core/adapt/latent_adaptation.h"
-#include "pmeta_core/base/error.h"
 #include "pmeta_core/learn/sac.h"
 #include "pmeta_core/personal/learner_kind.h"
 
@@ -25,13 +22,7 @@ class SacKind : public LearnerKind {
     pmeta::bind(settings, "sac.", settings_);
   }
 
-  void check() const override {
-    const std::vector<int>& counts = settings_.context.exploration_episodes;
-    if (std::adjacent_find(counts.begin(), counts.end(), std::greater_equal<int>()) !=
-        counts.end()) {
-      throw Error("sac.exploration_episodes must be ascending, e.g. [5, 15].");
-    }
-  }
+  void check() const override { pmeta::check(settings_.context, "sac."); }
 
   bool hasNetworks() const override { return true; }
   void setPortable(bool portable) override {

@@ -28,6 +28,11 @@ std::size_t ReplayBuffer::add(const Transition& transition) {
   return slot;
 }
 
+void ReplayBuffer::clear() {
+  size_ = next_ = 0;
+  values_.clear();
+}
+
 Transition ReplayBuffer::operator[](std::size_t slot) const {
   const float* observation = values_.data() + slot * stride_;
   const float* action = observation + observation_size_;

@@ -19,7 +19,7 @@ class GaussianActor : public Actor {
   /// In up to `max_batch` environments at once. The network must outlive the actor, as
   /// `parameters` must; nullptr: to be given by use() before it acts.
   GaussianActor(const Mlp& network, std::vector<float> task_input, std::size_t max_batch, By by,
-                const float* parameters = nullptr);
+                const float* parameters = nullptr, float min_log_std = GaussianPolicy::kMinLogStd);
 
   void use(const float* parameters) { parameters_ = parameters; }
 

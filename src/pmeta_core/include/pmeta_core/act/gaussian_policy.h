@@ -13,14 +13,14 @@ namespace pmeta {
 ///     log pi(a) = sum_j [ log N(u_j; mean_j, std_j) - log(1 - a_j^2) ]
 ///
 /// A network's output, the heads, is [batch, 2 * action_size]: means, then log std, which is
-/// clamped to [-5, 2] and has no gradient outside. Holds what backward() needs of the last batch;
-/// allocates nothing after construction.
+/// clamped to [min_log_std, 2] and has no gradient outside. Holds what backward() needs of the last
+/// batch; allocates nothing after construction.
 class GaussianPolicy {
  public:
   static constexpr float kMinLogStd = -5, kMaxLogStd = 2;
 
   /// For batches of up to `max_batch` rows.
-  GaussianPolicy(std::size_t action_size, std::size_t max_batch);
+  GaussianPolicy(std::size_t action_size, std::size_t max_batch, float min_log_std = kMinLogStd);
 
   /// Draws an action for each row of `heads`.
   void sample(const float* heads, std::size_t batch, Rng& rng);
@@ -36,8 +36,15 @@ class GaussianPolicy {
   /// may be less than the last one: its first rows.
   void backward(std::size_t batch, const float* d_action, float d_log_prob, float* d_heads) const;
 
+  /// `weight` times the mean of mean^2 plus that of (clamped) log std^2, over the first `batch`
+  /// rows of the last batch and all action components; its gradient is added to `d_heads`.
+  double addPenalty(std::size_t batch, double weight, float* d_heads) const;
+
  private:
+  bool isInside(float log_std) const { return log_std >= min_log_std_ && log_std <= kMaxLogStd; }
+
   std::size_t action_size_;
+  float min_log_std_;
   // all [max_batch, action_size]
   AlignedFloats mean_, log_std_, noise_, action_, deviation_, log_density_;
   AlignedFloats log_prob_;

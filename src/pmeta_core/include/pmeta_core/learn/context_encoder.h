@@ -44,6 +44,12 @@ struct ContextSettings {
 /// Binds all of them below `prefix`, e.g. "sac.".
 void bind(Settings& settings, const std::string& prefix, ContextSettings& context);
 
+/// Binds the encoder's own, without those of one robot's collection and update.
+void bindEncoder(Settings& settings, const std::string& prefix, ContextSettings& context);
+
+/// Throws Error on settings that do not go together.
+void check(const ContextSettings& context, const std::string& prefix);
+
 /// q(z|c), a diagonal Gaussian; [latent_size] each.
 struct LatentPosterior {
   std::vector<double> mean;

@@ -28,6 +28,7 @@ class ContextStore {
                int action_size);
 
   void add(const Transition& transition) { kept_.add(transition); }
+  void clear() { kept_.clear(); }
   const ReplayBuffer& kept() const { return kept_; }
 
   /// Draws a context from what is kept, settings.window transitions in a row of it if that is not

@@ -17,11 +17,12 @@ namespace pmeta {
 std::vector<float> oneHot(int task, int num_tasks);
 
 /// The networks of soft actor-critic, whose parameters lie in one flat vector as the blocks
-/// "actor.*", "critic1.*", "critic2.*" and, with task_encoding "inference", "encoder.*".
+/// "actor.*", "critic1.*", "critic2.*", with backbone "value" "value.*" and, with task_encoding
+/// "inference", "encoder.*".
 ///
 /// The actor takes [observation, task input] and gives the heads of a GaussianPolicy; a critic
-/// takes [observation, task input, action]. The task input is the same in every row: the task's
-/// one-hot vector, the encoder's z, or nothing.
+/// takes [observation, task input, action], the value network what the actor takes. The task input
+/// is the same in every row: the task's one-hot vector, the encoder's z, or nothing.
 class SacNetworks {
  public:
   /// `num_tasks`: length of the one-hot vector; ignored unless task_encoding is "one_hot". Throws
@@ -30,27 +31,37 @@ class SacNetworks {
 
   const Mlp& actor() const { return actor_; }
   const Mlp& critic(int k) const { return k == 0 ? critic1_ : critic2_; }  ///< k: 0 or 1
+  bool hasValue() const { return value_.has_value(); }
+  const Mlp& value() const { return *value_; }  ///< only where hasValue()
   bool hasEncoder() const { return encoder_.has_value(); }
   const ContextEncoder& encoder() const { return *encoder_; }  ///< only where hasEncoder()
 
   // where each one's parameters begin; the actor's are the first
   std::size_t criticOffset(int k) const { return actor_.size() + (k == 0 ? 0 : critic1_.size()); }
-  std::size_t encoderOffset() const { return criticOffset(1) + critic2_.size(); }
+  std::size_t valueOffset() const { return criticOffset(1) + critic2_.size(); }
+  std::size_t encoderOffset() const { return valueOffset() + (hasValue() ? value_->size() : 0); }
   std::size_t size() const;           ///< number of all parameters
   std::vector<Block> blocks() const;  ///< of all, in order
 
   std::size_t observationSize() const { return observation_size_; }
   std::size_t taskInputSize() const { return task_input_size_; }
   std::size_t actionSize() const { return action_size_; }
+  float minLogStd() const { return min_log_std_; }  ///< of the actor's GaussianPolicy
 
-  /// Each network as Mlp::initialise() does.
+  /// Each network as Mlp::initialise() does. With initialisation "rlkit" as the library of that
+  /// name, with which PEARL was released: hidden weights from U(-b, b), b = 1 / sqrt(outputs of the
+  /// layer), hidden biases 0.1, and the last layer from U(-0.003, 0.003), the actor's a third of
+  /// it.
   void initialise(float* parameters, Rng& rng) const;
 
  private:
   std::size_t observation_size_;
   std::size_t action_size_;
   std::size_t task_input_size_;
+  float min_log_std_;
+  bool as_rlkit_;
   Mlp actor_, critic1_, critic2_;
+  std::optional<Mlp> value_;
   std::optional<ContextEncoder> encoder_;
 };
 

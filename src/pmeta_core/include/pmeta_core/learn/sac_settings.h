@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "pmeta_core/act/gaussian_policy.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/learn/context_encoder.h"
 #include "pmeta_core/learn/temperature.h"
@@ -26,6 +27,15 @@ struct SacSettings {
   ContextSettings context;      ///< with task_encoding "inference"
   int evaluation_episodes = 5;  ///< episodes of one evaluation, by tanh(mean)
   bool portable = false;        ///< see MlpSpec; set by the experiment's `arithmetic`
+
+  // what baselines alone have a choice of
+  /// What next states are worth by: "twin", target copies of both critics, or "value", a target
+  /// copy of a network of its own (as in "Soft Actor-Critic: Off-Policy Maximum Entropy Deep
+  /// Reinforcement Learning", 2018), which learns min_k Q_k(s, x, a) - alpha log pi(a).
+  std::string backbone = "twin";
+  double min_log_std = GaussianPolicy::kMinLogStd;  ///< see GaussianPolicy
+  double head_penalty = 0;                          ///< see GaussianPolicy::addPenalty()
+  std::string initialisation = "torch";             ///< or "rlkit": see SacNetworks::initialise()
 
   // what a round does besides resetting parameters
   std::string targets_at_round = "keep";  ///< target critics: "keep", or "meta": the meta-policy's

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "pmeta_core/act/gaussian_policy.h"
@@ -22,6 +23,7 @@ struct SacLosses {
   double entropy = 0;      ///< minus the mean of log pi over the batch
   double temperature = 0;  ///< alpha after the update
   double kl = 0;           ///< KL(q(z|c) || N(0, I)); 0 without an encoder
+  double value = 0;        ///< the value network's; 0 without one
 };
 
 /// The update of soft actor-critic (Haarnoja et al., "Soft Actor-Critic Algorithms and
@@ -34,10 +36,14 @@ struct SacLosses {
 ///     y         = scale * r + discount * (min_k Qbar_k(s', x, a') - alpha log pi(a'))
 ///     critic k:   mean over the batch of (Q_k(s, x, a_stored) - y)^2
 ///     encoder:    the sum of both critics' losses by z + kl_weight * KL(q(z|c) || N(0, I))
-///     actor:      mean over the batch of alpha log pi(a) - min_k Q_k(s, x, a), z fixed
+///     actor:      mean over the batch of alpha log pi(a) - min_k Q_k(s, x, a), z fixed,
+///                 + head_penalty
 ///
 /// discount is gamma, 0 after a terminal state; the horizon is none. Each context of an update
-/// gives its z to an equal part of the batch.
+/// gives its z to an equal part of the batch; KL is the mean of theirs. With backbone "value"
+///
+///     y           = scale * r + discount * Vbar(s', x)
+///     value:      mean over the batch of (V(s, x) - [min_k Q_k(s, x, a) - alpha log pi(a)])^2
 class SacUpdate {
  public:
   /// `task_input`: x of every row, where no encoder infers it. The networks must outlive the
@@ -45,7 +51,7 @@ class SacUpdate {
   SacUpdate(const SacNetworks& networks, const SacSettings& settings,
             std::vector<float> task_input);
 
-  /// Makes the target critics copies of `parameters`'; to be called before the first update.
+  /// Makes the targets copies of `parameters`'; to be called before the first update.
   void resetTargets(const float* parameters);
 
   /// The contexts of the next update, to be drawn before any row is put in; none without an
@@ -57,14 +63,15 @@ class SacUpdate {
   /// Takes the transition as the row-th of the batch.
   void put(std::size_t row, const Transition& transition);
 
-  /// Hands `optimizer` the gradients of critic 1 and 2 (whose targets follow in the same pass), of
-  /// the encoder, and, with the moved critics, of the actor; last, the temperature moves. Allocates
-  /// nothing.
+  /// Hands `optimizer` the gradients of critic 1 and 2, of the encoder, and, with the moved
+  /// critics, of the value network, if there is one, and the actor; targets follow in the same
+  /// pass. Last, the temperature moves. Allocates nothing.
   SacLosses apply(const float* parameters, Optimizer<float>& optimizer, Rng& rng);
 
   const Temperature& temperature() const { return temperature_; }
-  const AlignedFloats& targets() const { return targets_; }  ///< critic 1's, then critic 2's
-  std::int64_t updates() const { return updates_; }          ///< calls of apply() so far
+  /// Critic 1's, then critic 2's, or the value network's.
+  const AlignedFloats& targets() const { return targets_; }
+  std::int64_t updates() const { return updates_; }  ///< calls of apply() so far
 
   /// Targets, temperature and count.
   void saveState(StateWriter& writer) const;
@@ -72,28 +79,35 @@ class SacUpdate {
 
  private:
   void computeTargets();
+  void putActions(const float* actions, AlignedFloats& critic_input) const;
+  void judgeActions(const float* parameters);
+  double updateValue(const float* parameters, Optimizer<float>& optimizer);
   double updateCritic(int k, const float* parameters, Optimizer<float>& optimizer);
   double updateEncoder(const float* parameters, Optimizer<float>& optimizer);
   double updateActor(const float* parameters, Optimizer<float>& optimizer);
   void actionGradient(int k, const float* parameters);
   InferredTask& taskOf(std::size_t row) { return tasks_[row * tasks_.size() / batch_]; }
+  // of critic k, where critics have one
   float* target(int k) { return targets_.data() + (k == 0 ? 0 : networks_.critic(0).size()); }
 
   const SacNetworks& networks_;
-  double reward_scale_, tau_, kl_weight_;
+  double reward_scale_, tau_, kl_weight_, head_penalty_;
   std::size_t batch_, observation_size_, action_size_;
   std::vector<float> task_input_;
   Temperature temperature_;
   AlignedFloats targets_;
   std::int64_t updates_ = 0;
 
-  MlpWorkspace actor_workspace_;                 // rows: s, then s'
+  std::size_t policy_rows_;                      // s, then s' where actions there are needed
+  MlpWorkspace actor_workspace_;                 // policy_rows_
   std::vector<MlpWorkspace> critic_workspaces_;  // of critic 1 and 2
-  GaussianPolicy policy_;                        // rows: s, then s'
-  AlignedFloats actor_input_;                    // 2 batch x (observation, x)
-  AlignedFloats critic_input_;                   // batch x (observation, x, action)
+  std::optional<MlpWorkspace> value_workspace_;
+  GaussianPolicy policy_;       // policy_rows_
+  AlignedFloats actor_input_;   // rows s, then s': 2 batch x (observation, x)
+  AlignedFloats critic_input_;  // batch x (observation, x, action)
   AlignedFloats next_critic_input_;
-  std::vector<float> rewards_, discounts_, y_, errors_, d_q_;
+  std::vector<float> rewards_, discounts_, soft_values_, y_, errors_, d_q_;
+  const float* q_[2] = {nullptr, nullptr};    // of the actor's actions in s
   std::vector<std::size_t> minimum_rows_[2];  // where critic 1 or 2 is the smaller one
   AlignedFloats d_action_rows_, d_action_, d_heads_;
   AlignedFloats gradient_;  // of one network at a time

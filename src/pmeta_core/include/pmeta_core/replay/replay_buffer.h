@@ -30,6 +30,9 @@ class ReplayBuffer {
   /// Copies a transition and returns its slot.
   std::size_t add(const Transition& transition);
 
+  /// Forgets all transitions.
+  void clear();
+
   Transition operator[](std::size_t slot) const;
 
   std::size_t capacity() const { return capacity_; }
