@@ -22,7 +22,7 @@ ProximalAdamSettings adam(double learning_rate) {
 // the release. Pages that no transition has reached cost nothing.
 std::size_t replaySize(const MetaTasks& tasks, int wanted, const SacNetworks& networks) {
   constexpr std::int64_t kMost = 1000000;
-  const std::int64_t total = std::max<std::int64_t>(tasks.total_steps, 1);
+  const std::int64_t total = tasks.total_steps > 0 ? tasks.total_steps : kMost;
   const std::int64_t each = wanted > 0 ? wanted : std::min(total, kMost);
   const double bytes_each =
       4.0 * static_cast<double>(2 * networks.observationSize() + networks.actionSize() + 2);
