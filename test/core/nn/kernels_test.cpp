@@ -240,5 +240,40 @@ TEST_F(KernelsTest, TanhGaussianOfTheEndsOfTheRange) {
   }
 }
 
+TEST_F(KernelsTest, TanhAndItsSlopeAgreeWithDouble) {
+  const std::size_t n = 1003;
+  const auto x = noise(n, 1, 12), d = noise(n, 2);
+  expectSameBits([&](const Kernels& kernel) {
+    std::vector<float> y = x, slope = d;
+    kernel.hyperbolicTangent(y.data(), n);
+    kernel.scaleByTanhSlope(slope.data(), y.data(), n);
+    for (std::size_t k = 0; k < n; ++k) {
+      const double t = std::tanh(double(x[k]));
+      EXPECT_NEAR(y[k], t, 3e-7) << x[k];
+      EXPECT_NEAR(slope[k], d[k] * (1 - t * t), 1e-6) << x[k];
+    }
+    y.insert(y.end(), slope.begin(), slope.end());
+    return y;
+  });
+}
+
+TEST_F(KernelsTest, GruOfTheEndsOfTheRange) {
+  // gates wide open or shut, in either way, and a number that is none
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<float> recurrent(3), previous = {0.5f};
+  for (const std::string& name : kernelNames()) {
+    setKernels(name);
+    float next = 0;
+    std::vector<float> keeps = {-1e30f, 1e30f, 1e30f, 0}, takes = {-1e30f, 1e30f, -1e30f, 0};
+    std::vector<float> broken = {0, nan, 0, 0};
+    kernels().gruForward(keeps.data(), recurrent.data(), previous.data(), &next, 1, 1);
+    EXPECT_EQ(next, 0.5f) << name;
+    kernels().gruForward(takes.data(), recurrent.data(), previous.data(), &next, 1, 1);
+    EXPECT_EQ(next, -1) << name;
+    kernels().gruForward(broken.data(), recurrent.data(), previous.data(), &next, 1, 1);
+    EXPECT_TRUE(std::isnan(next)) << "divergence shows";
+  }
+}
+
 }  // namespace
 }  // namespace pmeta

@@ -56,7 +56,8 @@ std::vector<double> reference(const Mlp& mlp, const std::vector<double>& paramet
   std::size_t l = 0;
   for (; l < spec.hidden.size(); ++l) {
     x = linear(mlp, parameters, "layer" + std::to_string(l), x, spec.hidden[l]);
-    for (double& unit : x) unit = std::max(unit, 0.0);
+    const bool relu = spec.activation == Activation::kRelu;
+    for (double& unit : x) unit = relu ? std::max(unit, 0.0) : std::tanh(unit);
   }
   if (!spec.dueling) return linear(mlp, parameters, "layer" + std::to_string(l), x, spec.outputs);
   const double value = linear(mlp, parameters, "value", x, 1)[0];
@@ -102,7 +103,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(Shape{{"q", 4, {13, 10}, 2}, 9}, Shape{{"q", 5, {17, 12}, 3, true}, 6},
                       Shape{{"q", 3, {}, 2}, 4}, Shape{{"q", 3, {}, 2, true}, 1},
                       Shape{{"critic1", 7, {20}, 1}, 12}, Shape{{"pi", 6, {9, 8, 11}, 10}, 5},
-                      Shape{{"pi", 6, {9}, 4, true}, 1}),
+                      Shape{{"pi", 6, {9}, 4, true}, 1},
+                      Shape{{"pi", 6, {9, 12}, 4, false, false, Activation::kTanh}, 5}),
     [](const auto& test) { return "Number" + std::to_string(test.index); });
 
 TEST_P(MlpOf, ForwardAgreesWithDoubleOnEveryInstructionSet) {

@@ -104,7 +104,8 @@ const float* Mlp::forward(const float* parameters, const float* input, std::size
     const Layer& layer = layers_[l];
     const float* weight = parameters + layer.weight;
     const float* bias = parameters + layer.bias;
-    const bool relu = l + 1 < layers_.size();
+    const bool hidden = l + 1 < layers_.size();
+    const bool relu = hidden && spec_.activation == Activation::kRelu;
     float* y = workspace.activations_[l].data();
     if (batch <= kFewRows || layer.outputs <= kFewOutputs) {
       kernel.affine(x, weight, bias, y, batch, layer.inputs, layer.outputs, relu);
@@ -113,6 +114,7 @@ const float* Mlp::forward(const float* parameters, const float* input, std::size
                layer.inputs, weight, layer.inputs, 0, y, layer.outputs);
       (relu ? kernel.addBiasRelu : kernel.addBias)(y, bias, batch, layer.outputs);
     }
+    if (hidden && !relu) kernel.hyperbolicTangent(y, batch * layer.outputs);
     x = y;
   }
   if (!spec_.dueling) return x;
@@ -154,6 +156,8 @@ void Mlp::backwardThrough(const float* parameters, const float* input, std::size
                           std::size_t count, const std::size_t* rows, float* d_input,
                           MlpWorkspace& workspace) const {
   const Kernels& kernel = kernels();
+  const auto throughActivation =
+      spec_.activation == Activation::kRelu ? kernel.maskRelu : kernel.scaleByTanhSlope;
   const float* delta = d_output;
   if (spec_.dueling) {
     splitHeads(d_output, batch, spec_.outputs, workspace.delta_.data());
@@ -179,9 +183,9 @@ void Mlp::backwardThrough(const float* parameters, const float* input, std::size
     product_(Transpose::kNo, Transpose::kNo, batch, in, out, 1, delta, out, weight, in, 0, next,
              in);
     const float* activations = workspace.activations_[l - 1].data();
-    if (rows == nullptr) kernel.maskRelu(next, activations, batch * in);
+    if (rows == nullptr) throughActivation(next, activations, batch * in);
     for (std::size_t b = 0; rows != nullptr && b < batch; ++b) {
-      kernel.maskRelu(next + b * in, activations + rows[b] * in, in);
+      throughActivation(next + b * in, activations + rows[b] * in, in);
     }
     // what was just written is the next layer's; the other buffer is free
     delta = next;

@@ -43,6 +43,12 @@ struct Kernels {
   /// d[k] <- activation[k] <= 0 ? 0 : d[k], where `activation` is the ReLU's output.
   void (*maskRelu)(float* d, const float* activation, std::size_t n);
 
+  /// y[k] <- tanh(y[k]), to a few units of rounding of 1. NaN stays NaN.
+  void (*hyperbolicTangent)(float* y, std::size_t n);
+
+  /// d[k] <- d[k] (1 - activation[k]^2), where `activation` is the tanh's output.
+  void (*scaleByTanhSlope)(float* d, const float* activation, std::size_t n);
+
   /// sums[c] <- sum over r of x[r][c]: a bias gradient.
   void (*columnSums)(const float* x, float* sums, std::size_t rows, std::size_t columns);
 
@@ -66,6 +72,22 @@ struct Kernels {
   void (*tanhGaussian)(const float* mean, const float* log_std, const float* noise, float low,
                        float high, float* action, float* deviation, float* log_density,
                        std::size_t n);
+
+  /// One step of a gated recurrent unit (Cho et al., 2014; reset after the product): a row of
+  /// `gates` holds what the input gives to n, r, z and `units` numbers more, one of `recurrent`
+  /// what the hidden state h gives to r, z and n (q), biases added:
+  ///
+  ///     r <- sigmoid(r + r_h),  z <- sigmoid(z + z_h),  n <- tanh(n + r q)
+  ///     next <- (1 - z) n + z h
+  ///
+  /// The row of `gates` is n, r, z, q then. h is `previous`.
+  void (*gruForward)(float* gates, const float* recurrent, const float* previous, float* next,
+                     std::size_t rows, std::size_t units);
+
+  /// Back through it: rows of `gates` become the loss's gradients by what was summed up for n, r
+  /// and z, and by q; `d_previous` becomes z d_next, the part that does not pass through the gates.
+  void (*gruBackward)(float* gates, const float* previous, const float* d_next, float* d_previous,
+                      std::size_t rows, std::size_t units);
 
   /// One pass over n parameters:
   ///

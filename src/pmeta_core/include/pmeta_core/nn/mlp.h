@@ -11,7 +11,10 @@
 
 namespace pmeta {
 
-/// Sizes of a multi-layer perceptron with ReLU hidden layers and a linear output.
+/// Of hidden units.
+enum class Activation { kRelu, kTanh };
+
+/// Sizes of a multi-layer perceptron with a linear output.
 struct MlpSpec {
   std::string prefix;               ///< first part of its block names, e.g. "q"
   std::size_t inputs = 0;           ///< positive
@@ -19,6 +22,7 @@ struct MlpSpec {
   std::size_t outputs = 0;          ///< positive
   bool dueling = false;             ///< two heads, Q = V + A - mean A (Wang et al., 2016, eq. 9)
   bool portable = false;            ///< products by gemmEigen: the same bits on every processor
+  Activation activation = Activation::kRelu;
 };
 
 class Mlp;
