@@ -28,10 +28,10 @@ const EnvSpec& requireContinuous(const EnvSpec& env) {
   return env;
 }
 
-MlpSpec network(const char* prefix, const SacSettings& settings, std::size_t inputs,
+MlpSpec network(const char* name, const SacSettings& settings, std::size_t inputs,
                 std::size_t outputs) {
   MlpSpec spec;
-  spec.prefix = prefix;
+  spec.prefix = settings.prefix + name;
   spec.inputs = inputs;
   spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
   spec.outputs = outputs;

@@ -54,6 +54,10 @@ SacUpdate::SacUpdate(const SacNetworks& networks, const SacSettings& settings,
       d_action_(batch_ * action_size_),
       d_heads_(2 * batch_ * action_size_),
       gradient_(std::max(networks_.actor().size(), networks_.critic(0).size())) {
+  if (settings.task_encoding == "given") {
+    d_task_input_.resize(batch_ * networks_.taskInputSize());
+    d_latent_rows_.resize(d_task_input_.size());
+  }
   const std::size_t contexts = countContexts(settings);
   for (int k = 0; k < 2; ++k) {
     critic_workspaces_.emplace_back(networks_.critic(k), batch_);
@@ -81,19 +85,25 @@ void SacUpdate::resetTargets(const float* parameters) {
   }
 }
 
-// into the inputs of all networks; the next actions are not known yet
 void SacUpdate::put(std::size_t row, const Transition& t) {
   const std::vector<float>& x = tasks_.empty() ? task_input_ : taskOf(row).z;
+  put(row, t, x.data(), x.data());
+}
+
+// into the inputs of all networks; the next actions are not known yet
+void SacUpdate::put(std::size_t row, const Transition& t, const float* x, const float* next_x) {
   const std::size_t actor_row = networks_.actor().inputs();
-  const auto write = [&](const float* observation, float* actor, float* critic) {
+  const auto write = [&](const float* observation, const float* input, float* actor,
+                         float* critic) {
     std::copy_n(observation, observation_size_, actor);
-    std::copy(x.begin(), x.end(), actor + observation_size_);
+    std::copy_n(input, networks_.taskInputSize(), actor + observation_size_);
     return std::copy_n(actor, actor_row, critic);
   };
   const std::size_t critic_row = row * networks_.critic(0).inputs();
-  float* action = write(t.observation, &actor_input_[row * actor_row], &critic_input_[critic_row]);
+  float* action =
+      write(t.observation, x, &actor_input_[row * actor_row], &critic_input_[critic_row]);
   std::copy_n(t.action, action_size_, action);
-  write(t.next_observation, &actor_input_[(batch_ + row) * actor_row],
+  write(t.next_observation, next_x, &actor_input_[(batch_ + row) * actor_row],
         &next_critic_input_[critic_row]);
   rewards_[row] = t.reward;
   discounts_[row] = t.discount;
@@ -101,6 +111,7 @@ void SacUpdate::put(std::size_t row, const Transition& t) {
 
 SacLosses SacUpdate::apply(const float* parameters, Optimizer<float>& optimizer, Rng& rng) {
   for (InferredTask& task : tasks_) std::fill(task.d_z.begin(), task.d_z.end(), 0.0f);
+  std::fill(d_task_input_.begin(), d_task_input_.end(), 0.0f);
   // one pass for the actions in s' and in s: the actor does not move before its own step
   const float* heads =
       networks_.actor().forward(parameters, actor_input_.data(), policy_rows_, actor_workspace_);
@@ -160,11 +171,12 @@ double SacUpdate::updateCritic(int k, const float* parameters, Optimizer<float>&
   const float* q = critic.forward(theta, critic_input_.data(), batch_, workspace);
   for (std::size_t b = 0; b < batch_; ++b) errors_[b] = q[b] - y_[b];
   const double loss = kernels().squaredLoss(errors_.data(), nullptr, d_q_.data(), batch_);
-  const std::size_t latent = d_latent_rows_.size() / batch_;  // 0 without an encoder
+  const std::size_t latent = d_latent_rows_.size() / batch_;  // 0 where nobody wants it
   critic.backward(theta, critic_input_.data(), batch_, d_q_.data(), gradient_.data(),
                   observation_size_, latent, latent == 0 ? nullptr : d_latent_rows_.data(),
                   workspace);
-  for (std::size_t b = 0; b < batch_ && latent > 0; ++b) {
+  for (std::size_t i = 0; i < d_task_input_.size(); ++i) d_task_input_[i] += d_latent_rows_[i];
+  for (std::size_t b = 0; b < batch_ && !tasks_.empty(); ++b) {
     float* d_z = taskOf(b).d_z.data();
     for (std::size_t j = 0; j < latent; ++j) d_z[j] += d_latent_rows_[b * latent + j];
   }

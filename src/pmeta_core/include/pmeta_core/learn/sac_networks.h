@@ -25,8 +25,9 @@ std::vector<float> oneHot(int task, int num_tasks);
 /// is the same in every row: the task's one-hot vector, the encoder's z, or nothing.
 class SacNetworks {
  public:
-  /// `num_tasks`: length of the one-hot vector; ignored unless task_encoding is "one_hot". Throws
-  /// Error if actions are discrete or there is no task to encode.
+  /// `num_tasks`: length of the one-hot vector, or of the task input that is given; ignored with
+  /// other kinds of task_encoding. Throws Error if actions are discrete or there is no task to
+  /// encode.
   SacNetworks(const EnvSpec& env, const SacSettings& settings, int num_tasks);
 
   const Mlp& actor() const { return actor_; }

@@ -22,7 +22,8 @@ struct SacSettings {
   int env_steps_per_update = 1;          ///< environment steps before each update
   TemperatureSettings temperature;
   /// What tells the networks the task besides the observation: "inference" (a latent vector that
-  /// the context encoder infers), "one_hot" (the task's number), or "none".
+  /// the context encoder infers), "one_hot" (the task's number), "none", or, for learners that make
+  /// the input themselves, "given".
   std::string task_encoding = "one_hot";
   ContextSettings context;      ///< with task_encoding "inference"
   int evaluation_episodes = 5;  ///< episodes of one evaluation, by tanh(mean)
@@ -33,6 +34,7 @@ struct SacSettings {
   /// copy of a network of its own (as in "Soft Actor-Critic: Off-Policy Maximum Entropy Deep
   /// Reinforcement Learning", 2018), which learns min_k Q_k(s, x, a) - alpha log pi(a).
   std::string backbone = "twin";
+  std::string prefix;  ///< of the names of all networks, where there are others beside them
   double min_log_std = GaussianPolicy::kMinLogStd;  ///< see GaussianPolicy
   double head_penalty = 0;                          ///< see GaussianPolicy::addPenalty()
   std::string initialisation = "torch";             ///< or "rlkit": see SacNetworks::initialise()

@@ -63,6 +63,13 @@ class SacUpdate {
   /// Takes the transition as the row-th of the batch.
   void put(std::size_t row, const Transition& transition);
 
+  /// The same with task inputs of the row's own: x in s, and `next_x` in s'.
+  void put(std::size_t row, const Transition& transition, const float* x, const float* next_x);
+
+  /// With task_encoding "given": gradient by x of the sum of both critics' losses in the last
+  /// apply(), [batch, task input].
+  const AlignedFloats& taskInputGradient() const { return d_task_input_; }
+
   /// Hands `optimizer` the gradients of critic 1 and 2, of the encoder, and, with the moved
   /// critics, of the value network, if there is one, and the actor; targets follow in the same
   /// pass. Last, the temperature moves. Allocates nothing.
@@ -115,6 +122,7 @@ class SacUpdate {
   std::vector<InferredTask> tasks_;  // empty without an encoder
   AlignedFloats d_latent_rows_;      // batch x latent
   AlignedFloats encoder_gradient_;   // of one context
+  AlignedFloats d_task_input_;       // batch x task input, where that is given
 };
 
 }  // namespace pmeta
