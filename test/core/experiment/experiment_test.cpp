@@ -62,6 +62,13 @@ TEST(Experiment, WhatCannotBeLearntOrHeldNamesItsSettings) {
             std::string::npos);
 }
 
+TEST(Experiment, FedProxPullsTowardsWhatTheRoundBeganWith) {
+  const Experiment e = gridExperiment({"algorithm:=fedprox", "lambda:=3"});
+  EXPECT_EQ(e.settings().personal.lambda, 3);
+  EXPECT_EQ(e.settings().personal.eta, 0);
+  EXPECT_EQ(e.notes(), Notes{"algorithm fedprox sets personal.eta to 0."});
+}
+
 TEST(Experiment, ModelAveragingIsSettings) {
   const Experiment e = gridExperiment({"algorithm:=model_averaging", "personal_init:=keep"});
   EXPECT_EQ(e.settings().personal.lambda, 0);
@@ -156,7 +163,7 @@ TEST(Experiment, ValuesOutOfRangeAreRefused) {
             "rounds is '0' (given as rounds:=0) but must be a whole number, from 1 to 1e+06.");
   EXPECT_EQ(refused({"algorithm:=maml"}),
             "algorithm is 'maml' (given as algorithm:=maml) but must be one of "
-            "independent, model_averaging, pmeta, pooled.");
+            "fedprox, independent, model_averaging, pmeta, pooled, maml_trpo, pearl, promp, rl2.");
   EXPECT_EQ(refused({"quorum:=6"}),
             "aggregation.quorum is 6 but there are 5 tasks: give at most that, or 0 for all.");
 }

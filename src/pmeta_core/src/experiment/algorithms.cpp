@@ -55,6 +55,16 @@ Algorithm modelAveraging() {
   return row;
 }
 
+// Li et al., "Federated Optimization in Heterogeneous Networks", 2020, with the pull as pMeta has it
+Algorithm fedProx() {
+  Algorithm row;
+  row.label = "FedProx";
+  row.meaning = "personal parameters, pulled towards the round's meta-policy, are aggregated";
+  row.pulls = true;
+  row.fixed_anchor = true;
+  return row;
+}
+
 Algorithm independent() {
   Algorithm row;
   row.label = "independent";
@@ -84,6 +94,7 @@ Algorithm pooled() {
 
 const Row kPmeta(algorithms(), "pmeta", pmeta());
 const Row kModelAveraging(algorithms(), "model_averaging", modelAveraging());
+const Row kFedProx(algorithms(), "fedprox", fedProx());
 const Row kIndependent(algorithms(), "independent", independent());
 const Row kPooled(algorithms(), "pooled", pooled());
 

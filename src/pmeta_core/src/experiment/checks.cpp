@@ -21,6 +21,11 @@ void Experiment::applyAlgorithm() {
   ExperimentSettings& e = settings_;
   if (hasMetaLearner()) return meta_learner_->check(numTasks());
   if (algorithm_->check) algorithm_->check(e, *learner_, numTasks());
+  if (algorithm_->fixed_anchor) {
+    if (e.personal.eta != 0)
+      notes_.push_back("algorithm " + e.algorithm + " sets personal.eta to 0.");
+    e.personal.eta = 0;
+  }
   if (algorithm_->pulls) return;
   const std::string init = evaluatesMeta() ? "meta" : "keep";
   std::vector<std::string> changes;

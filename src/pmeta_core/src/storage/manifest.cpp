@@ -40,9 +40,10 @@ std::vector<std::string> fixedSettings(const Experiment& experiment, const Algor
   std::vector<std::string> keys;
   for (const auto& [key, value] : experiment.definingSettings()) {
     const bool pull = std::find(kPull.begin(), kPull.end(), key) != kPull.end();
-    if (pull ? !algorithm.pulls : !algorithm.shares && key.rfind("aggregation.", 0) == 0) {
-      keys.push_back(key);
-    }
+    const bool without_use =
+        pull ? !algorithm.pulls || (algorithm.fixed_anchor && key == "personal.eta")
+             : !algorithm.shares && key.rfind("aggregation.", 0) == 0;
+    if (without_use) keys.push_back(key);
   }
   return keys;
 }
@@ -62,15 +63,16 @@ Json curves(const Experiment& experiment) {
   return found;
 }
 
-// pmeta, averaging, independent, pooled; then meta-learners by name
+// pmeta, averaging, independent, pooled, a fixed anchor; then meta-learners by name
 int orderOf(const Experiment& experiment) {
   const Algorithm& algorithm = experiment.algorithm();
+  if (algorithm.fixed_anchor) return 4;
   if (!experiment.hasMetaLearner()) {
     return !algorithm.pulls + !algorithm.shares + algorithm.pools_environments;
   }
   const std::vector<std::string> names = metaLearners().names();
   const auto found = std::find(names.begin(), names.end(), experiment.settings().algorithm);
-  return 4 + static_cast<int>(found - names.begin());
+  return 5 + static_cast<int>(found - names.begin());
 }
 
 Json figures(const Experiment& experiment) {
@@ -80,7 +82,7 @@ Json figures(const Experiment& experiment) {
   Json found;
   found["label"] = algorithm.label;
   found["order"] = orderOf(experiment);
-  found["baseline"] = !algorithm.pulls;
+  found["baseline"] = !algorithm.pulls || algorithm.fixed_anchor;
   found["reference_line"] = averages;
   found["compared_by"] = name(averages || at_once ? PolicyKind::kMeta : PolicyKind::kPersonal);
   found["own_settings"] = algorithm.pulls ? kPull : std::vector<std::string>();

@@ -24,6 +24,8 @@ struct Algorithm {
   Sent sent = Sent::kPersonal;
   /// Are the personal parameters pulled towards the auxiliary ones? If not, lambda is 0.
   bool pulls = false;
+  /// Do those stay where the round found them, the meta-policy? If so, eta is 0.
+  bool fixed_anchor = false;
   /// Does the aggregate come back as each round's start? If not, agents keep what they have, beta
   /// is 0, and no meta-policy is evaluated.
   bool shares = true;
