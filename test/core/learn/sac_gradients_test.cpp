@@ -45,8 +45,8 @@ class Reference {
       next_.emplace_back(t.next_observation, t.next_observation + 3);
       rewards_.push_back(t.reward);
     }
-    // for the actions in s, then for those in s'
-    for (int b = 0; b < 2 * settings_.batch_size; ++b) {
+    // for the actions in s, then, where critics have targets, for those in s'
+    for (int b = 0; b < (networks_.hasValue() ? 1 : 2) * settings_.batch_size; ++b) {
       const double first = rng.normal();
       noise_.push_back({first, rng.normal()});
     }
@@ -96,16 +96,22 @@ class Reference {
     return outputs(networks_.critic(k), theta, concatenated({s, x, a}))[0];
   }
 
-  // a ~ pi with row b's noise, and log pi(a)
-  Vector action(const Vector& p, const Vector& s, const Vector& x, std::size_t b,
-                double& log_prob) const {
+  double v(const double* theta, const Vector& s, const Vector& x) const {
+    return outputs(networks_.value(), theta, concatenated({s, x}))[0];
+  }
+
+  // a ~ pi with row b's noise, log pi(a), and the squares that the penalty is on
+  Vector action(const Vector& p, const Vector& s, const Vector& x, std::size_t b, double& log_prob,
+                double* squares = nullptr) const {
     const Vector heads = outputs(networks_.actor(), p.data(), concatenated({s, x}));
     Vector a(2);
     log_prob = 0;
     for (std::size_t j = 0; j < 2; ++j) {
-      const double log_std = std::min(std::max(heads[2 + j], -5.0), 2.0), e = noise_[b][j];
+      const double log_std = std::min(std::max(heads[2 + j], settings_.min_log_std), 2.0);
+      const double e = noise_[b][j];
       a[j] = std::tanh(heads[j] + std::exp(log_std) * e);
       log_prob += -0.5 * e * e - log_std - 0.5 * std::log(2 * M_PI) - std::log(1 - a[j] * a[j]);
+      if (squares != nullptr) *squares += heads[j] * heads[j] + log_std * log_std;
     }
     return a;
   }
@@ -115,15 +121,19 @@ class Reference {
     const std::vector<Vector> x = inputs(p);
     Vector result;
     for (std::size_t b = 0; b < s_.size(); ++b) {
-      double log_prob = 0;
-      const Vector a = action(p, next_[b], x[b], s_.size() + b, log_prob);
-      const double q1 = q(0, targets_.data(), next_[b], x[b], a);
-      const double q2 = q(1, targets_.data() + networks_.critic(0).size(), next_[b], x[b], a);
       const bool terminal = std::abs(next_[b][0]) > 2.5;
-      result.push_back(1.5 * rewards_[b] +
-                       (terminal ? 0 : 0.9) * (std::min(q1, q2) - alpha_ * log_prob));
+      result.push_back(1.5 * rewards_[b] + (terminal ? 0 : 0.9) * nextValue(p, x[b], b));
     }
     return result;
+  }
+
+  double nextValue(const Vector& p, const Vector& x, std::size_t b) const {
+    if (networks_.hasValue()) return v(targets_.data(), next_[b], x);
+    double log_prob = 0;
+    const Vector a = action(p, next_[b], x, s_.size() + b, log_prob);
+    const double q1 = q(0, targets_.data(), next_[b], x, a);
+    const double q2 = q(1, targets_.data() + networks_.critic(0).size(), next_[b], x, a);
+    return std::min(q1, q2) - alpha_ * log_prob;
   }
 
   double criticLoss(int k, const Vector& p, const std::vector<Vector>& x, const Vector& y) const {
@@ -135,13 +145,35 @@ class Reference {
     return sum / static_cast<double>(y.size());
   }
 
-  // with the critics of p as well
-  double actorLoss(const Vector& p, const std::vector<Vector>& x,
-                   double* mean_log_prob = nullptr) const {
-    double sum = 0, log_probs = 0;
+  // min_k Q_k(s, x, a) - alpha log pi(a) of every sample, with the critics of p
+  Vector softValues(const Vector& p, const std::vector<Vector>& x) const {
+    Vector values;
     for (std::size_t b = 0; b < s_.size(); ++b) {
       double log_prob = 0;
       const Vector a = action(p, s_[b], x[b], b, log_prob);
+      const double q1 = q(0, p.data() + networks_.criticOffset(0), s_[b], x[b], a);
+      const double q2 = q(1, p.data() + networks_.criticOffset(1), s_[b], x[b], a);
+      values.push_back(std::min(q1, q2) - alpha_ * log_prob);
+    }
+    return values;
+  }
+
+  double valueLoss(const Vector& p, const std::vector<Vector>& x, const Vector& learnt) const {
+    double sum = 0;
+    for (std::size_t b = 0; b < s_.size(); ++b) {
+      const double e = v(p.data() + networks_.valueOffset(), s_[b], x[b]) - learnt[b];
+      sum += e * e;
+    }
+    return sum / static_cast<double>(s_.size());
+  }
+
+  // with the critics of p as well
+  double actorLoss(const Vector& p, const std::vector<Vector>& x,
+                   double* mean_log_prob = nullptr) const {
+    double sum = 0, log_probs = 0, squares = 0;
+    for (std::size_t b = 0; b < s_.size(); ++b) {
+      double log_prob = 0;
+      const Vector a = action(p, s_[b], x[b], b, log_prob, &squares);
       const double q1 = q(0, p.data() + networks_.criticOffset(0), s_[b], x[b], a);
       const double q2 = q(1, p.data() + networks_.criticOffset(1), s_[b], x[b], a);
       sum += alpha_ * log_prob - std::min(q1, q2);
@@ -149,7 +181,7 @@ class Reference {
     }
     const auto n = static_cast<double>(s_.size());
     if (mean_log_prob != nullptr) *mean_log_prob = log_probs / n;
-    return sum / n;
+    return sum / n + settings_.head_penalty * squares / (2 * n);
   }
 
  private:
@@ -207,11 +239,17 @@ void expectGradient(const std::vector<float>& gradient, std::size_t offset, std:
 class SacGradients : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(SacGradients, AreTheLossesByFiniteDifferences) {
-  const bool windows = GetParam() == std::string("inference_by_windows");
-  SacSettings settings = smallSettings(windows ? "inference" : GetParam());
-  if (windows) {
+  const std::string name = GetParam();
+  SacSettings settings = smallSettings(name.find("inference") == 0 ? "inference" : name);
+  if (name == "inference_by_windows") {
     settings.context.window = 12;
     settings.context.per_update = 3;
+  }
+  if (name == "inference_and_value") {
+    settings.backbone = "value";
+    settings.min_log_std = -20;
+    settings.head_penalty = 0.3;
+    settings.context.per_update = 4;
   }
   Trainer trainer(settings);
   const SacNetworks& networks = trainer.learner.networks();
@@ -244,9 +282,15 @@ TEST_P(SacGradients, AreTheLossesByFiniteDifferences) {
       EXPECT_NEAR(losses.kl, reference.kl(before), 1e-4 * losses.kl);
     }
 
-    // the actor's step sees the critics that have moved
+    // the steps of value network and actor see the critics that have moved
     Vector moved(trainer.parameters.begin(), trainer.parameters.end());
     std::copy_n(before.begin(), networks.actor().size(), moved.begin());
+    if (networks.hasValue()) {
+      const Vector learnt = reference.softValues(moved, x);
+      EXPECT_NEAR(losses.value, reference.valueLoss(before, x, learnt), 1e-4 * losses.value);
+      expectGradient(gradient, networks.valueOffset(), networks.value().size(), before,
+                     [&](const Vector& p) { return reference.valueLoss(p, x, learnt); });
+    }
     double mean_log_prob = 0;
     EXPECT_NEAR(losses.actor, reference.actorLoss(moved, x, &mean_log_prob), 1e-4);
     EXPECT_NEAR(losses.entropy, -mean_log_prob, 1e-4);
@@ -256,7 +300,8 @@ TEST_P(SacGradients, AreTheLossesByFiniteDifferences) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Encodings, SacGradients,
-                         ::testing::Values("none", "one_hot", "inference", "inference_by_windows"),
+                         ::testing::Values("none", "one_hot", "inference", "inference_by_windows",
+                                           "inference_and_value"),
                          [](const auto& info) { return std::string(info.param); });
 
 }  // namespace
