@@ -180,7 +180,7 @@ def going_on(command, folder):
     """The command that goes on with what that folder holds."""
     if command[0] == "sweep":
         return [LOCAL] + command + ["--resume"]
-    if list(folder.glob("r/checkpoint/aggregator*")):
+    if list(folder.glob("r/checkpoint/aggregator.*.h5")):
         return [LOCAL] + command[:2] + ["resume:=%s" % (folder / "r")]
     shutil.rmtree(str(folder), ignore_errors=True)
     return [LOCAL] + command
