@@ -55,11 +55,16 @@ SweepResult runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
   std::vector<const Experiment*> open;
   SweepProgress progress;
   progress.total = static_cast<int>(runs.size());
+  SweepResult result{folder, progress.total, 0, false, {}};
   // of one that is not run here: it is finished already, or somebody else writes it
   const auto leave = [&](const Experiment& run, const std::string& in_use) {
     SweepProgress left = progress;
     left.skipped = in_use.empty();
-    if (left.skipped) left.done = ++progress.done;
+    if (left.skipped) {
+      left.done = ++progress.done;
+    } else {
+      ++result.in_use;
+    }
     left.in_use = in_use;
     left.run_id = run.settings().run_id;
     left.personal_return = left.meta_return = std::numeric_limits<double>::quiet_NaN();
@@ -98,18 +103,18 @@ SweepResult runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
           leave(*open[i], in_use);
           continue;
         }
-        const LocalResult result = runLocally(
+        const LocalResult ended = runLocally(
             *open[i], &run->log, [&](const RoundBook::Round&) { return !stop; }, run->round);
-        run->log.finish(result.stopped ? "stopped" : "finished");
-        if (result.stopped) return;
+        run->log.finish(ended.stopped ? "stopped" : "finished");
+        if (ended.stopped) return;
         std::error_code error;  // a finished run needs no checkpoints, which are most of its size
         std::filesystem::remove_all(run->log.dir() + "/checkpoint", error);
         const std::lock_guard<std::mutex> lock(mutex);
         ++done_here;
         ++progress.done;
         progress.run_id = open[i]->settings().run_id;
-        progress.personal_return = result.rounds.back().summary.personal_return;
-        progress.meta_return = result.rounds.back().summary.meta_return;
+        progress.personal_return = ended.rounds.back().summary.personal_return;
+        progress.meta_return = ended.rounds.back().summary.meta_return;
         progress.seconds = secondsSince(start);
         progress.eta_seconds = secondsSince(begin) / done_here * (runs.size() - progress.done);
         on_progress(progress);
@@ -123,8 +128,9 @@ SweepResult runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
   std::vector<std::thread> threads;
   for (int j = 0; j < plan.jobs; ++j) threads.emplace_back(work);
   for (std::thread& thread : threads) thread.join();
-  SweepResult result{folder, {}};
   for (auto& [place, failure] : failures) result.failures.push_back(std::move(failure));
+  const auto failed = static_cast<int>(failures.size());
+  result.stopped = progress.done + result.in_use + failed < result.total;
   return result;
 }
 

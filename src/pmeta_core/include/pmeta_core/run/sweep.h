@@ -48,6 +48,9 @@ struct SweepFailure {
 /// What a sweep gives.
 struct SweepResult {
   std::string folder;                  ///< that holds the runs
+  int total = 0;                       ///< runs of the plan
+  int in_use = 0;                      ///< of these, left to whom else writes them
+  bool stopped = false;                ///< before each had its turn
   std::vector<SweepFailure> failures;  ///< in the order of the plan
 };
 
