@@ -1,5 +1,6 @@
-// Soft actor-critic: a whole update, an action, and the context encoder.
+// Soft actor-critic: a whole update, also PEARL's, an action, and the context encoder.
 #include "bench_util.h"
+#include "pearl_update.h"
 #include "sac_update.h"
 
 namespace bench {
@@ -25,6 +26,19 @@ BENCHMARK(SacUpdateOf)
     ->Args({512, 256})
     ->Args({128, 128})
     ->Unit(benchmark::kMicrosecond);
+
+// PEARL's with its default settings
+void PearlUpdateOf(benchmark::State& state) {
+  PearlUpdate update;
+  double ceiling = sgemmCeiling(update.rows());
+  double adam = update.adamSeconds();
+  const double seconds = callSeconds(state, 1, update);
+  ceiling = std::max(ceiling, sgemmCeiling(update.rows()));
+  adam = std::min(adam, update.adamSeconds());
+  report({Part::kLoops, 8}, "PEARL update, 20+6, [128,128], 4 tasks of 64 and 128 rows of context",
+         Unit::kSeconds, seconds, update.flops() / ceiling + adam, "products, then Adam");
+}
+BENCHMARK(PearlUpdateOf)->Unit(benchmark::kMicrosecond);
 
 // an environment step by a sample of the policy, kept in the replay
 void SacStep(benchmark::State& state) {

@@ -37,6 +37,19 @@ class NoiseEnv : public pmeta::Env {
   int steps_ = 0;
 };
 
+/// Operations in products that no implementation of the update can leave out, without an encoder's:
+/// per sample each critic forward three times (target, loss, actor's step) and its weights'
+/// gradient, its activations' gradient once for the loss and, for one critic of two, once for the
+/// actor; the actor forward twice, and back. Two hidden layers of h units; `in`: the actor's
+/// inputs.
+inline double sacFlops(double h, double batch, double in, double action) {
+  const double first = (in + action) * h, rest = h * h + h;
+  const double actor_first = in * h, actor_rest = h * h + 2 * action * h;
+  const double critics = 8 * (first + rest) + 3 * rest + action * h;
+  const double actor = 3 * (actor_first + actor_rest) + actor_rest;
+  return 2 * batch * (critics + actor);
+}
+
 /// SacLearner's update by Adam with pull, auxiliary and targets: actor and twin critics of two
 /// hidden layers of `units`, 25 observations, 6 actions. peers.py does the same in PyTorch.
 class SacUpdate {
@@ -61,20 +74,11 @@ class SacUpdate {
 
   void collect() { learner.collect(phi.data(), rng); }
 
-  /// Products that no implementation can leave out, without an encoder's: per sample each critic
-  /// forward three times (target, loss, actor's step) and its weights' gradient, its activations'
-  /// gradient once for the loss and, for one critic of two, once for the actor; the actor forward
-  /// twice, and back.
   double flops() const {
-    const auto h = static_cast<double>(learner.settings().hidden.front());
-    const auto batch = static_cast<double>(learner.settings().batch_size);
-    const double in = static_cast<double>(learner.networks().actor().inputs());
-    const double action = static_cast<double>(learner.networks().actionSize());
-    const double first = (in + action) * h, rest = h * h + h;
-    const double actor_first = in * h, actor_rest = h * h + 2 * action * h;
-    const double critics = 8 * (first + rest) + 3 * rest + action * h;
-    const double actor = 3 * (actor_first + actor_rest) + actor_rest;
-    return 2 * batch * (critics + actor);
+    return sacFlops(static_cast<double>(learner.settings().hidden.front()),
+                    static_cast<double>(learner.settings().batch_size),
+                    static_cast<double>(learner.networks().actor().inputs()),
+                    static_cast<double>(learner.networks().actionSize()));
   }
 
   /// Floor of the optimiser: critics with targets, the actor without.

@@ -74,7 +74,7 @@ IterationStats Pearl::iterate(std::uint64_t seed, std::uint64_t iteration) {
   for (Loss& loss : losses_) loss.value = 0;
   const double share = 1.0 / settings_.updates_per_iteration;
   for (int u = 0; u < settings_.updates_per_iteration; ++u) {
-    const SacLosses now = updateOnce(rng);
+    const SacLosses now = update(rng);
     const double all[] = {now.critic, now.actor, now.entropy, now.temperature, now.kl, now.value};
     for (std::size_t i = 0; i < losses_.size(); ++i) losses_[i].value += share * all[i];
   }
@@ -99,7 +99,7 @@ void Pearl::collect(std::uint64_t seed, std::uint64_t iteration, Rng& rng, Itera
   });
 }
 
-SacLosses Pearl::updateOnce(Rng& rng) {
+SacLosses Pearl::update(Rng& rng) {
   const float* parameters = model_.floats().data();
   std::size_t row = 0;
   for (InferredTask& inferred : update_.tasks()) {

@@ -38,14 +38,15 @@ class Pearl : public MetaLearner {
   void saveState(StateWriter& writer) const override;
   void loadState(StateReader& reader) override;
 
+  /// One update of an iteration, on what there is after its steps. Allocates nothing.
+  SacLosses update(Rng& rng);
+
   const PearlCollector& task(std::size_t i) const { return *tasks_[i]; }
-  const SacUpdate& update() const { return update_; }
+  const SacNetworks& networks() const { return policies_.networks(); }
 
  private:
-  const SacNetworks& networks() const { return policies_.networks(); }
   std::int64_t brokenEpisodes() const;
   void collect(std::uint64_t seed, std::uint64_t iteration, Rng& rng, IterationStats& stats);
-  SacLosses updateOnce(Rng& rng);
 
   PearlSettings settings_;
   SacSettings update_settings_;
