@@ -148,8 +148,10 @@ def test_the_colours_of_the_policies_are_those_of_rviz():
         assert "%s = rgb(0x%s)" % (name, color[1:].lower()) in text
     assert pf.PP["color"] == pf.TASK_STYLES["personal"][1] == pd.PP_COLOR
     assert pf.MP["color"] == pf.TASK_STYLES["meta"][1] == pd.MP_COLOR
-    others = [style["color"] for style in pf.BASELINE_STYLES]
-    assert len(set(others + [pd.PP_COLOR, pd.MP_COLOR])) == 5
+    styles = pd.BASELINE_STYLES
+    for what in ("color", "linestyle", "marker"):
+        assert len(set(style[what] for style in styles)) >= len(styles) - 1 == 7, what
+    assert len(set([s["color"] for s in styles] + [pd.PP_COLOR, pd.MP_COLOR])) == len(styles) + 2
 
 
 def test_figures_say_what_their_bands_are(tmp_path, sweep):

@@ -141,6 +141,28 @@ def make_newer(folder):
     edit(folder, "manifest.json", change)
 
 
+def write_at_once(top, algorithm="gamma", order=5, rounds=4, experiment="grid", **named):
+    """A run of an algorithm that learns all tasks in one process, with one setting of its own."""
+    folder = write_run(top, algorithm, rounds=rounds, experiment=experiment, **named)
+    edit(folder, "rounds.csv", lambda text: "".join(
+        line for line in text.splitlines(True) if ",personal," not in line))
+
+    def change(text):
+        manifest = json.loads(text)
+        manifest["defining_settings"] = {
+            "experiment": experiment, "algorithm": algorithm, "rounds": str(rounds),
+            "updates_per_round": str(named.get("updates", 1)), "environment.name": "gridworld",
+            "environment.sizes": "[4, 5]", "environment.slip": "[0]", algorithm + ".clip": "0.3"}
+        manifest["figures"] = {
+            "label": algorithm.upper(), "order": order, "baseline": True, "reference_line": False,
+            "compared_by": "meta", "own_settings": [], "fixed_settings": [], "curves": [],
+            "policies": "gaussian_mlp"}
+        return json.dumps(manifest)
+
+    edit(folder, "manifest.json", change)
+    return folder
+
+
 class Kept(pd.Figures):
     """Keeps [(figure, name)] as they are."""
 
