@@ -59,7 +59,7 @@ class SacUpdate {
   /// encoder.
   std::vector<InferredTask>& tasks() { return tasks_; }
 
-  std::size_t batch() const { return batch_; }
+  std::size_t batch() const { return batch_; }  ///< transitions of an update
 
   /// Takes the transition as the row-th of the batch.
   void put(std::size_t row, const Transition& transition);
@@ -76,13 +76,14 @@ class SacUpdate {
   /// pass. Last, the temperature moves. Allocates nothing.
   SacLosses apply(const float* parameters, Optimizer<float>& optimizer, Rng& rng);
 
-  const Temperature& temperature() const { return temperature_; }
+  const Temperature& temperature() const { return temperature_; }  ///< as the last update left it
   /// Critic 1's, then critic 2's, or the value network's.
   const AlignedFloats& targets() const { return targets_; }
   std::int64_t updates() const { return updates_; }  ///< calls of apply() so far
 
   /// Targets, temperature and count.
   void saveState(StateWriter& writer) const;
+  /// Refuses targets of another size, and a temperature that is not finite.
   void loadState(StateReader& reader);
 
  private:
