@@ -25,6 +25,7 @@ struct TrialMemory {
 /// Acts by a policy of RL². A step that breaks its episode down leaves no trace in its memory.
 class Rl2Actor : public Actor {
  public:
+  /// The mean of its distribution, which draws nothing, or a sample.
   enum class By { kMean, kSample };
 
   /// All episodes in one environment are one trial. In up to `max_batch` environments at once; the
@@ -38,6 +39,7 @@ class Rl2Actor : public Actor {
   /// A trial begins in every environment.
   void forget();
 
+  /// Of the trial in environment `env` so far.
   const TrialMemory& memory(std::size_t env) const { return memories_[env]; }
 
   void begin(std::size_t env, Rng& rng) override;
@@ -66,6 +68,7 @@ class Rl2Adaptation : public Adaptation {
   /// `parameters` stay as they are; they and the networks must outlive this.
   Rl2Adaptation(const Rl2Networks& networks, const float* parameters);
 
+  /// Of the exploration so far.
   const TrialMemory& memory() const { return acting_.memory(0); }
 
   void beginEpisode(Rng&) override {}

@@ -60,8 +60,11 @@ class Gru {
   /// Throws Error unless every size is positive and the prefix a name.
   explicit Gru(GruSpec spec);
 
+  /// As it was made.
   const GruSpec& spec() const { return spec_; }
+  /// Numbers of an input.
   std::size_t inputs() const { return spec_.inputs; }
+  /// Numbers of a hidden state.
   std::size_t units() const { return spec_.units; }
   std::size_t size() const { return size_; }  ///< number of parameters
 

@@ -36,6 +36,7 @@ class MetaTrainer : public Party {
   std::int64_t brokenEpisodes() const override { return broken_episodes_; }
   int round() const override { return round_; }
   void saveState(StateWriter& writer) const override;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader) override;
 
  private:
