@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from programs import CONFIG, LOCAL, TOP, environment, run
+from programs import CONFIG, LOCAL, TOP, environment, rows, run
 
 SETTINGS = ["rounds:=1000", "pace:=0.05", "run_id:=faults"]
 
@@ -111,11 +111,6 @@ def test_nodes_stop_and_say_so_when_the_master_is_gone(tmp_path, restarted):
 
 
 SHORT = ["rounds:=20", "pace:=0.1", "seed:=3"]
-
-
-def rows(folder):
-    """The lines of rounds.csv without the wall time."""
-    return [line.rsplit(",", 1)[0] for line in (folder / "rounds.csv").read_text().splitlines()]
 
 
 def undisturbed(tmp_path):

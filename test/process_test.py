@@ -1,19 +1,16 @@
-"""What shell, system and terminal do to a program: closed descriptors, signals, limits."""
+"""What shell, system and terminal do to a program: closed descriptors, its end, limits."""
 import json
 import os
-import shutil
 import signal
 import subprocess
 
 import pytest
 
-from programs import CONFIG, LOCAL, TOP, run
+from programs import CONFIG, LOCAL, TOP, rows, run
 
 CART_POLE = TOP / "config/cart_pole.yaml"
 SMALL = ["preset:=quick", "hidden:=[64,64]", "rounds:=1", "updates_per_round:=20",
          "evaluation_episodes:=1"]
-HALF_CHEETAH = ["preset:=quick", "rounds:=1", "updates_per_round:=5", "sac.warm_up_steps:=20",
-                "environment.horizon:=20", "evaluation_episodes:=1"]
 
 
 def grid(tmp_path, *more):
@@ -27,11 +24,6 @@ def folder(tmp_path):
 
 def manifest(tmp_path):
     return json.loads((folder(tmp_path) / "manifest.json").read_text())
-
-
-def rows(path):
-    """The lines of rounds.csv without the wall time."""
-    return [line.rsplit(",", 1)[0] for line in (path / "rounds.csv").read_text().splitlines()]
 
 
 def shell(tmp_path, text, *more):
@@ -143,46 +135,6 @@ def test_an_evaluation_ends_at_once(tmp_path):
     assert process.returncode == -signal.SIGTERM
 
 
-TICK = """
-#include <signal.h>
-#include <sys/time.h>
-static void nothing(int signal) { (void)signal; }
-__attribute__((constructor)) static void start(void) {
-  struct sigaction action = {0};
-  struct itimerval every = {{0, 2000}, {0, 2000}};
-  action.sa_handler = nothing;
-  action.sa_flags = SA_RESTART;
-  sigaction(SIGALRM, &action, 0);
-  setitimer(ITIMER_REAL, &every, 0);
-}
-"""
-
-
-@pytest.mark.skipif(shutil.which("g++") is None, reason="needs a compiler")
-def test_signals_at_any_moment_change_no_result(tmp_path):
-    (tmp_path / "tick.c").write_text(TICK)
-    built = run(["g++", "-x", "c", "-shared", "-fPIC", "-o", tmp_path / "tick.so",
-                 tmp_path / "tick.c"])
-    assert built.returncode == 0, built.stderr
-    found = []
-    for preload in ("", str(tmp_path / "tick.so")):
-        results = tmp_path / ("ticked" if preload else "calm")
-        env = dict(os.environ, LD_PRELOAD=preload)
-        robot = [TOP / "config/half_cheetah_dir.yaml", "run_id:=r", "results_dir:=%s" % results]
-        for command in (["run", CART_POLE, "run_id:=r", "results_dir:=%s" % results] + SMALL,
-                        ["run"] + robot + HALF_CHEETAH,
-                        ["sweep", CART_POLE, "seed:=0-1", "results_dir:=%s" % results] + SMALL):
-            done = run([LOCAL] + command, env=env)
-            assert done.returncode == 0, done.stderr
-        policy = results / "cart_pole/r/policies/meta.safetensors"
-        evaluated = run([LOCAL, "evaluate", policy, "--episodes", "5"], env=env)
-        assert evaluated.returncode == 0, evaluated.stderr
-        found.append((evaluated.stdout, {path.relative_to(results): rows(path.parent)
-                                         for path in results.glob("**/rounds.csv")}))
-    assert len(found[0][1]) == 4
-    assert found[0] == found[1]
-
-
 def parameters(path):
     """The bytes of a policy file behind its header, which names the results folder."""
     data = path.read_bytes()
@@ -206,6 +158,13 @@ def test_portable_arithmetic_does_not_ask_which_processor_it_runs_on(tmp_path):
     assert len(found["portable policies"]) == 1
     # what differs between processors would show
     assert len(found["native policies"]) == len(found["native"])
+
+
+def test_portable_parameters_are_the_pinned_ones_whatever_onednn_may_use():
+    for instructions in ("SSE41", "AVX2"):
+        done = run([TOP / "devel/lib/pmeta_core/core_test", "--gtest_filter=Pinned/Parameters.*"],
+                   env=dict(os.environ, ONEDNN_MAX_CPU_ISA=instructions))
+        assert done.returncode == 0 and "[  PASSED  ] 7 tests." in done.stdout, done.stdout
 
 
 def test_a_run_that_goes_on_elsewhere_says_so(tmp_path):

@@ -141,6 +141,28 @@ def make_newer(folder):
     edit(folder, "manifest.json", change)
 
 
+def write_at_once(top, algorithm="gamma", order=5, rounds=4, experiment="grid", **named):
+    """A run of an algorithm that learns all tasks in one process, with one setting of its own."""
+    folder = write_run(top, algorithm, rounds=rounds, experiment=experiment, **named)
+    edit(folder, "rounds.csv", lambda text: "".join(
+        line for line in text.splitlines(True) if ",personal," not in line))
+
+    def change(text):
+        manifest = json.loads(text)
+        manifest["defining_settings"] = {
+            "experiment": experiment, "algorithm": algorithm, "rounds": str(rounds),
+            "updates_per_round": str(named.get("updates", 1)), "environment.name": "gridworld",
+            "environment.sizes": "[4, 5]", "environment.slip": "[0]", algorithm + ".clip": "0.3"}
+        manifest["figures"] = {
+            "label": algorithm.upper(), "order": order, "baseline": True, "reference_line": False,
+            "compared_by": "meta", "own_settings": [], "fixed_settings": [], "curves": [],
+            "policies": "gaussian_mlp"}
+        return json.dumps(manifest)
+
+    edit(folder, "manifest.json", change)
+    return folder
+
+
 class Kept(pd.Figures):
     """Keeps [(figure, name)] as they are."""
 
@@ -224,3 +246,21 @@ def edit(folder, name, change):
 def groups_of(top):
     folders, _ = pr.find_folders([str(top)])
     return pg.group_runs(pr.load_runs(folders))
+
+
+def lines_of(axis):
+    """{label: (x, y)} of what the legend names."""
+    return {line.get_label(): (list(line.get_xdata()), list(line.get_ydata()))
+            for line in axis.lines if not line.get_label().startswith("_")}
+
+
+def over_seeds(folders, *arguments, **named):
+    """Mean over seeds of a curve, straight from the files."""
+    return [statistics.mean(v) for v in zip(*(curve(f, *arguments, **named) for f in folders))]
+
+
+def table_row(text, *words):
+    """The one line that holds all the words."""
+    lines = [line for line in text.split("\n") if all(word in line for word in words)]
+    assert len(lines) == 1, lines
+    return lines[0]

@@ -93,7 +93,8 @@ run_make() {
   fi
 }
 
-# Builds the given targets into the folder BUILD; without any, all, where something has changed.
+# Builds the given targets, of which `all` comes first, into the folder BUILD; without any, all,
+# where something has changed.
 build() {
   [ $# -gt 0 ] || ! is_built || return 0
   setup
@@ -107,7 +108,7 @@ build() {
   touch_what_changed
   before=$(inputs)
   run_make "$@"
-  if [ $# = 0 ]; then
+  if [ "${1:-all}" = all ]; then
     echo "$before" > "$TOP/build/inputs"
     products > "$TOP/build/products"
   fi

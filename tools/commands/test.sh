@@ -23,12 +23,20 @@ run_tests() {
   local results=$TOP/build/test_results
   rm -rf "$results"
   mkdir -p "$results/front_door"
-  echo "running the tests; output in build/tests.log"
-  # this ends with 0 when tests fail: the result files are what counts
-  (cd "$TOP" && make -C build -j1 run_tests) > "$TOP/build/tests.log" 2>&1 ||
-    { tail -n 60 "$TOP/build/tests.log" >&2; die "the tests could not be run."; }
+  echo "running the tests; output of those in C++ in build/tests.log"
+  # Most of the time tests of either kind wait for processes. With job control, or what is in the
+  # background would ignore SIGINT
+  set -m
+  make -C "$TOP/build" -j1 run_tests > "$TOP/build/tests.log" 2>&1 &
+  local cpp_tests=$!
+  set +m
+  # shellcheck disable=SC2064
+  trap "kill -- -$cpp_tests 2> /dev/null || true" EXIT
   (cd "$TOP" && "$PYTHON" -m pytest -q -p no:cacheprovider test \
     --junitxml="$results/front_door/pytest.xml") || true
+  # this ends with 0 when tests fail: the result files are what counts
+  wait "$cpp_tests" || { tail -n 60 "$TOP/build/tests.log" >&2; die "the tests could not be run."; }
+  trap - EXIT
   "$PYTHON" "$TOP/test/count_results.py" "$results"
 }
 

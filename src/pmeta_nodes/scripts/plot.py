@@ -13,6 +13,7 @@ from pmeta_program import Parser, run_program
 
 # as in pmeta_kinds, which is slow to load, and of no use to a wrong argument
 NEEDS = {"curves": "it has no finished run",
+         "comparison": "it has no method that learns all tasks at once, beside another",
          "sweep": "no numeric setting of pMeta-RL differs between its runs",
          "tasks": "it has neither networks nor fresh episodes",
          "unseen": "it has neither test tasks nor an inference network",

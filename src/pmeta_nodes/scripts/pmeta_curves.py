@@ -29,11 +29,15 @@ def over_seeds(what, groups):
     return seeds if seeds == "1 seed" else "%s over %s" % (what, seeds)
 
 
-def draw_curve(axis, group, policy, label, band=True, steps=False, **style):
-    """Mean over seeds, with the interval of pmeta_statistics as a band; `steps`: progress_axis."""
+def draw_curve(axis, group, policy, label, band=True, steps=False, x=None, **style):
+    """Mean over seeds, with the interval of pmeta_statistics as a band.
+
+    Over `x`, or else over what progress_axis says of `steps`.
+    """
     curves = group.curves(policy)
     mean = curves.mean(axis=0)
-    x = group.env_steps if steps else group.rounds
+    if x is None:
+        x = group.env_steps if steps else group.rounds
     style.setdefault("markevery", max(1, len(mean) // 15))
     if len(mean) > MANY_ROUNDS:
         style.setdefault("linewidth", 1)

@@ -19,6 +19,13 @@ from pmeta_files import warn
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#666666"
 PALETTE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
+BROWN, VIOLET, OLIVE = "#8C510A", "#5E3C99", "#8A8D00"
+# a method keeps its own in every figure; lines and marks tell them apart in grey
+BASELINE_STYLES = tuple(
+    {"color": color, "linestyle": line, "marker": marker} for color, line, marker in (
+        (GREEN, "--", "^"), (ORANGE, "-.", "D"), (PURPLE, (0, (5, 1)), "v"),
+        (BROWN, (0, (3, 1.2, 1, 1.2)), "P"), (BLACK, (0, (6, 1.5)), "X"), (VIOLET, (0, (2, 1)), "<"),
+        (OLIVE, (0, (4, 1, 1, 1, 1, 1)), ">"), (RED, (0, (8, 2, 2, 2)), "p")))
 # personal policies and the meta-policy, as rviz shows them (scene_parts.h); far apart for
 # colour-blind readers, too, and in grey
 PP_COLOR, MP_COLOR = "#D81B60", "#0B4FB3"
@@ -33,6 +40,11 @@ STYLE = {
 
 def style():
     return plt.rc_context(STYLE)
+
+
+def baseline_style(place):
+    """Of the place of its algorithm among all, which is 1 or more for a baseline."""
+    return BASELINE_STYLES[(place - 1) % len(BASELINE_STYLES)]
 
 
 class Figures:
@@ -100,14 +112,14 @@ def panels(rows, columns, sharey=True, panel_width=None):
                         figsize=(width, 3.4 * rows + 0.3), constrained_layout=True)
 
 
-def legend_right(axes):
-    """One legend for all panels of a row, beside the last."""
+def legend_right(axes, inside=False):
+    """One legend for all panels of a row, beside the last, or in its place where it is empty."""
     entries = {}
     for axis in axes:
         for handle, label in zip(*axis.get_legend_handles_labels()):
             entries.setdefault(label, handle)
     axes[-1].legend(list(entries.values()), list(entries), loc="center left",
-                    bbox_to_anchor=(1.02, 0.5), borderaxespad=0, handlelength=2.6,
+                    bbox_to_anchor=(0 if inside else 1.02, 0.5), borderaxespad=0, handlelength=2.6,
                     ncol=1 + len(entries) // 16)
 
 

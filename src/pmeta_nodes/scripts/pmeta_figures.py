@@ -11,13 +11,10 @@ import pmeta_statistics as ps
 import pmeta_tables as pt
 from pmeta_curves import (MP, PP, RETURN, SPREAD, adaptation_curves, draw_curve, draw_optimum,
                           over_seeds, progress_axis, seeds_text)
-from pmeta_drawing import (GREEN, GREY, MP_COLOR, ORANGE, PALETTE, PP_COLOR, PURPLE, folder_for,
+from pmeta_drawing import (GREY, MP_COLOR, PALETTE, PP_COLOR, baseline_style, folder_for,
                            headline, legend_right, panels, row_height, spread_ticks, wrapped_name)
 from pmeta_files import SNAPSHOTS
 
-BASELINE_STYLES = ({"color": GREEN, "linestyle": "--", "marker": "^"},
-                   {"color": ORANGE, "linestyle": "-.", "marker": "D"},
-                   {"color": PURPLE, "linestyle": (0, (5, 1)), "marker": "v"})
 SHORT = {"personal": "PP", "meta": "MP"}
 MAX_PANELS = 3
 MAX_SLICES = 4
@@ -74,11 +71,11 @@ def baseline_curves(group, groups):
     """[(baseline, policy, label, style)]; one that goes on for longer is one, too."""
     found = []
     for algorithm in pg.baselines(groups):
-        baseline = (pg.baseline_of(group, groups, algorithm)
-                    or pg.baseline_of(group, groups, algorithm, free=pg.LENGTHS))
+        baseline = pg.rival_of(group, groups, algorithm)
         if baseline is not None and baseline.figures.compared_by in baseline.policies:
             lengths = [pg.setting_text(key, baseline.settings.get(key)) for key in pg.LENGTHS
-                       if baseline.settings.get(key) != group.settings.get(key)]
+                       if key not in baseline.absent | group.absent
+                       and baseline.settings.get(key) != group.settings.get(key)]
             policy, label, style = baseline_look(baseline)
             found.append((baseline, policy, " ".join([label] + lengths), style))
     return found
@@ -86,9 +83,9 @@ def baseline_curves(group, groups):
 
 def baseline_look(baseline):
     """(the policy it is judged by, label, style)"""
-    policy, order = baseline.figures.compared_by, baseline.figures.order
+    policy = baseline.figures.compared_by
     return (policy, "%s, %s" % (SHORT[policy], baseline.name),
-            BASELINE_STYLES[(order - 1) % len(BASELINE_STYLES)])
+            baseline_style(baseline.place))
 
 
 def draw_adaptation(axis, group, steps=False):

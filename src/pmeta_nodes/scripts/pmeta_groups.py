@@ -13,7 +13,9 @@ from pmeta_runs import find_folders, is_number, load_convergence, load_runs
 # settings that name a run or look at its result, and do not shape it
 NAMES = {"experiment", "preset", "algorithm", "seed", "run_id", "fresh_episodes"}
 # how far a run goes: where they differ, rounds compare nothing, but environment steps do
-LENGTHS = ("rounds", "updates_per_round")
+LENGTHS = ("rounds", "updates_per_round", "steps_per_round")
+# and how often it is looked at
+LOOKS = LENGTHS + ("evaluation_interval",)
 DEFAULTS = {"personal.lambda": 10, "personal.personal_init": "meta"}
 SYMBOLS = {"personal.lambda": "λ", "personal.alpha": "α", "personal.eta": "η",
            "aggregation.beta": "β", "q_learning.gamma": "γ", "q_learning.updates": "K",
@@ -44,6 +46,9 @@ class Group:
         self.runs = runs
         self.seeds = [run.seed for run in runs]
         self.figures = runs[0].figures
+        # settings that others of the experiment have, and no run of this algorithm
+        self.absent = frozenset()
+        self.place = self.figures.order
         self.label = self.name
         self.policies = [p for p in POLICIES if all(p in r.curves for r in runs)]
 
@@ -53,6 +58,11 @@ class Group:
         return self.figures.label
 
     @property
+    def unused(self):
+        """Settings by which it cannot be told from others."""
+        return self.figures.fixed_settings | self.absent
+
+    @property
     def rounds(self):
         return self.runs[0].rounds
 
@@ -60,6 +70,11 @@ class Group:
     def env_steps(self):
         """Environment steps of each task up to each round, mean over seeds."""
         return np.mean([run.env_steps for run in self.runs], axis=0)
+
+    @property
+    def total_steps(self):
+        """The same over all training tasks."""
+        return self.env_steps * self.runs[0].num_tasks
 
     def adaptations(self, split):
         """Numbers of exploration episodes that the meta-policy was tried after, ascending."""
@@ -76,6 +91,21 @@ class Group:
     def auc(self, policy):
         """Mean over the rounds: the area under the curve, in units of return."""
         return self.curves(policy).mean(axis=1)
+
+    def final(self, policy):
+        """Mean over the last tenth of the evaluations."""
+        return self.curves(policy)[:, -last_tenth(len(self.rounds)):].mean(axis=1)
+
+    def at_steps(self, policy, steps):
+        """Mean over the last tenth of the way to so many steps of all tasks; None before any mark.
+
+        Marks of other methods lie elsewhere: it is read off the lines between one's own.
+        """
+        marks = self.total_steps
+        if steps < marks[0]:
+            return None
+        places = np.linspace(max(marks[0], 0.9 * steps), steps, 11)
+        return np.array([np.interp(places, marks, c).mean() for c in self.curves(policy)])
 
     def best(self, policy):
         """The largest mean over the tasks in any round: what the paper calls best."""
@@ -128,6 +158,7 @@ def group_runs(runs):
     for experiment in sorted(buckets):
         groups = [Group(algorithm, dict(settings), _one_a_seed(members))
                   for (algorithm, settings), members in buckets[experiment].items()]
+        _tell_absent(groups)
         keys = varying(groups)
         groups.sort(key=lambda g: (g.figures.order, g.algorithm,
                                    [sort_key(g.settings.get(k)) for k in keys]))
@@ -146,7 +177,34 @@ def group_runs(runs):
                 warn("the runs of %s, %s, come from %d versions of the code: %s."
                      % (experiment, group.label, len(commits), ", ".join(commits)))
         experiments[experiment] = groups
+    _tell_places([group for groups in experiments.values() for group in groups])
     return experiments
+
+
+def last_tenth(marks):
+    return max(1, marks // 10)
+
+
+def _tell_places(groups):
+    """The order of each algorithm, which no other has, though runs of other versions differ in it."""
+    places = {}
+    for order, algorithm in sorted((g.figures.order, g.algorithm) for g in groups):
+        if algorithm not in places:
+            places[algorithm] = order
+            while places[algorithm] in [p for a, p in places.items() if a != algorithm]:
+                places[algorithm] += 1
+    for group in groups:
+        group.place = places[group.algorithm]
+
+
+def _tell_absent(groups):
+    """What an algorithm has no use for at all is no difference between it and others."""
+    known = {}
+    for group in groups:
+        known.setdefault(group.algorithm, set()).update(group.settings)
+    every = frozenset().union(*known.values())
+    for group in groups:
+        group.absent = every - known[group.algorithm]
 
 
 def _one_a_seed(runs):
@@ -174,7 +232,7 @@ def varying(groups):
                   key=lambda key: (key != "personal.lambda", key))
     return [key for key in keys if len(set(
         group.settings.get(key) for group in groups
-        if key not in group.figures.fixed_settings)) > 1]
+        if key not in group.unused)) > 1]
 
 
 def setting_texts(group, keys):
@@ -183,12 +241,13 @@ def setting_texts(group, keys):
     if "personal.lambda" in group.settings and "personal.lambda" not in keys:
         shown.insert(0, "personal.lambda")
     return [setting_text(k, group.settings.get(k)) for k in shown
-            if k not in group.figures.fixed_settings]
+            if k not in group.unused]
 
 
 def fixed_texts(group, groups, key):
     """["η=0.08", …]: the settings besides `key` that differ between `groups`."""
-    return [setting_text(k, group.settings.get(k)) for k in varying(groups) if k != key]
+    return [setting_text(k, group.settings.get(k)) for k in varying(groups)
+            if k != key and k not in group.absent]
 
 
 def short_name(key):
@@ -230,17 +289,22 @@ def reference(groups):
 
 
 def baseline_of(group, groups, algorithm, free=()):
-    """The group of `algorithm` with the settings of `group` in all that it uses, or None.
+    """The group of `algorithm` with the settings of `group` in all that both use, or None.
 
     Those in `free` may differ; of several such groups, the one that goes furthest.
     """
     def same(other):
-        unused = other.figures.fixed_settings | set(free)
+        unused = other.unused | group.absent | set(free)
         return {k: v for k, v in other.settings.items() if k not in unused} == {
             k: v for k, v in group.settings.items() if k not in unused}
 
     found = [other for other in groups if other.algorithm == algorithm and same(other)]
     return max(found, key=lambda other: other.env_steps[-1], default=None)
+
+
+def rival_of(group, groups, algorithm):
+    """The same, or of another length, for what is drawn over environment steps."""
+    return baseline_of(group, groups, algorithm) or baseline_of(group, groups, algorithm, LOOKS)
 
 
 def baselines(groups):
@@ -269,7 +333,7 @@ def chief(groups, limit):
     if len(groups) <= limit:
         return groups
     first = reference(without_baselines(groups) or groups)
-    first = [first] + [baseline_of(first, groups, name) for name in baselines(groups)]
+    first = [first] + [rival_of(first, groups, name) for name in baselines(groups)]
     chosen = [g for g in groups if g in first] + [g for g in groups if g not in first]
     return [g for g in groups if g in chosen[:limit]]
 

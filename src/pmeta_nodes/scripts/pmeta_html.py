@@ -70,6 +70,10 @@ CAPTIONS = (
     ("learning_curves", "Learning curves: the return after every round."),
     ("_curves", "Learning curves for every value of %s."),
     ("sweep_", "Return against %s."),
+    ("comparison_unseen", "The meta-policies of all methods on test tasks, before adaptation and "
+     "after it; dotted: the mean of the last tenth of the evaluations."),
+    ("comparison", "All methods beside ours on training tasks; dotted: the mean of the last tenth "
+     "of the evaluations."),
     ("tasks_last", "Returns task by task; a task that is stuck shows, which a mean hides."),
     ("_unseen_tasks", "The meta-policy on training tasks and on test tasks, which nobody trained "
      "on, before and after adaptation from exploration episodes, as far as there are any."),

@@ -11,6 +11,7 @@ import re
 import pmeta_archives as pa
 import pmeta_comparisons as pc
 import pmeta_groups as pg
+import pmeta_margins as pm
 import pmeta_runs as pr
 import pmeta_statistics as ps
 import pmeta_tables as pt
@@ -133,6 +134,27 @@ def comparisons_of(rows, groups):
     return markdown(heads, lines, 3) if lines else ""
 
 
+def wins_block(data, *names):
+    """Who wins where, in sentences."""
+    found = margins_of(data, names)
+    lines = ["* **%s**: %s" % (experiment, " ".join(pm.who_wins(rows)))
+             for experiment, rows in found.items()]
+    return "\n".join(lines or ["None of these runs can be compared yet."])
+
+
+def margins_block(data, *names):
+    """By how much, in a table for each experiment."""
+    parts = ["%s:\n\n%s" % (experiment, markdown(*pm.margin_cells(rows), words=2))
+             for experiment, rows in margins_of(data, names).items()]
+    return "\n\n".join(parts + not_run(data, names))
+
+
+def margins_of(data, names):
+    found = {experiment: pm.margin_rows(experiment, groups)
+             for experiment, groups in data.experiments(names).items()}
+    return {experiment: rows for experiment, rows in found.items() if rows}
+
+
 def commands_block(data, *names):
     """The commands, and what they were run with."""
     commands, lines = [], []
@@ -246,5 +268,6 @@ KINDS = {
     "learning": of_sweeps(lambda rows, groups: markdown(*pt.learning_cells(rows))),
     "returns": of_sweeps(lambda rows, groups: markdown(*pt.best_cells(rows), words=2)),
     "iqm": of_sweeps(lambda rows, groups: markdown(*pc.iqm_cells(rows), words=2)),
-    "comparisons": of_sweeps(comparisons_of),
+    "comparisons": of_sweeps(comparisons_of), "wins": wins_block,
+    "margins": margins_block,
 }

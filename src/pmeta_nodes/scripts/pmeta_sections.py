@@ -3,9 +3,10 @@
 import os
 
 import pmeta_comparisons as pc
+import pmeta_margins as pm
 import pmeta_tables as pt
 from pmeta_files import read_text
-from pmeta_html import details, facts, heading, link, preformatted, table, text
+from pmeta_html import details, facts, heading, link, paragraph, preformatted, table, text
 
 POLICY_WORDS = {"personal": "PP", "meta": "MP", "meta_test": "MP", "all": "all"}
 MANY_RUNS = 4  # more are folded away
@@ -15,7 +16,7 @@ def experiment_sections(experiment, groups, rows, folder):
     """Everything of one experiment but its figures; `folder` is where the report will lie."""
     members = [row for row in rows if row["experiment"] == experiment]
     return ([heading(2, experiment), facts(experiment_facts(groups))]
-            + return_tables(members, groups) + task_tables(experiment, groups)
+            + return_tables(experiment, members, groups) + task_tables(experiment, groups)
             + [heading(3, "Runs and settings"), runs_table(groups, folder)]
             + [settings_of(group) for group in groups])
 
@@ -70,7 +71,7 @@ def number_ranges(values):
     return ", ".join("%d" % a if a == b else "%d–%d" % (a, b) for a, b in found)
 
 
-def return_tables(rows, groups):
+def return_tables(experiment, rows, groups):
     heads, lines = pt.best_cells(rows)
     found = [heading(3, "Returns: best and last round"), html_table(heads, lines, words=2),
             heading(3, "Learning: mean over the rounds (AUC)"),
@@ -80,6 +81,10 @@ def return_tables(rows, groups):
     heads, lines = pc.comparison_cells(groups)
     if lines:
         found += [heading(3, "Comparisons"), html_table(heads, lines, words=3)]
+    margins = pm.margin_rows(experiment, groups)
+    if margins:
+        found += [heading(3, "Margins over other methods"), paragraph(" ".join(pm.who_wins(margins))),
+                  html_table(*pm.margin_cells(margins), words=2)]
     return found
 
 
@@ -116,7 +121,8 @@ def runs_table(groups, folder):
     for group in groups:
         for run in group.runs:
             files = [link(os.path.join(run.folder, name), folder, name)
-                     for name in ("rounds.csv", "final.csv", "config.yaml", "manifest.json")
+                     for name in ("rounds.csv", "losses.csv", "final.csv", "config.yaml",
+                                  "manifest.json")
                      if os.path.isfile(os.path.join(run.folder, name))]
             name = os.path.basename(os.path.normpath(run.folder))
             lines.append([link(run.folder, folder, name), text(group.label), text(run.seed),

@@ -81,3 +81,27 @@ def improvement(ours, theirs):
     random = np.random.default_rng(SEED)
     low, high = limits(better(resampled(ours, random), resampled(theirs, random)))
     return found, (float(low), float(high))
+
+
+def difference(ours, theirs):
+    """(mean of ours less that of theirs, its interval or None), of one value a seed each."""
+    return _of_means(ours, theirs, lambda one, other: one - other)
+
+
+def percent_above(ours, theirs):
+    """The same in percent of the size of theirs; None where theirs has no sign of its own."""
+    if min(theirs) <= 0 <= max(theirs):
+        return None
+    return _of_means(ours, theirs, lambda one, other: 100 * (one - other) / abs(other))
+
+
+def _of_means(ours, theirs, what):
+    ours, theirs = np.asarray(ours, dtype=float), np.asarray(theirs, dtype=float)
+    found = float(what(ours.mean(), theirs.mean()))
+    if min(len(ours), len(theirs)) < 2:
+        return found, None
+    random = np.random.default_rng(SEED)
+    one, other = (values[random.integers(len(values), size=(REPETITIONS, len(values)))].mean(axis=1)
+                  for values in (ours, theirs))
+    low, high = limits(what(one, other))
+    return found, (float(low), float(high))

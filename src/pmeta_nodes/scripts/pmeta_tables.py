@@ -3,11 +3,14 @@
 import csv
 import io
 import os
+import textwrap
 
 import numpy as np
 
 import pmeta_comparisons as pc
 import pmeta_groups as pg
+import pmeta_margins as pm
+import pmeta_methods as pms
 from pmeta_files import OWN_BEST, SNAPSHOTS
 from pmeta_manifest import data_file, plain
 
@@ -22,6 +25,9 @@ LEARNING = {  # head: columns of the mean and of its spread
     "PP AUC": ("pp_auc_mean", "pp_auc_std"), "MP AUC": ("mp_auc_mean", "mp_auc_std"),
     "MP - MA": ("mp_minus_ma_auc", "mp_minus_ma_auc_se"),
     "PP - MA": ("pp_minus_ma_auc", "pp_minus_ma_auc_se")}
+# columns that are left out where there is none of these: without PP none is set against averaging
+NEEDED = {"MP test last": "mp_test_last_mean", "PP last": "pp_last_mean", "PP AUC": "pp_last_mean",
+          "MP - MA": "pp_last_mean", "PP - MA": "pp_last_mean"}
 COLUMNS = ("experiment", "group", "algorithm", "lambda", "seeds", "pp_last_mean", "pp_last_std",
            "mp_last_mean", "mp_last_std", "pp_auc_mean", "pp_auc_std", "mp_auc_mean",
            "mp_auc_std", "pairs", "mp_minus_ma_auc", "mp_minus_ma_auc_se", "pp_minus_ma_auc",
@@ -132,11 +138,20 @@ def summary_text(rows, experiments):
         if compared:
             lines += ["", "experiment %s: comparisons" % experiment]
             lines += aligned(heads, compared, left=3)
+        margins = pm.margin_rows(experiment, experiments[experiment])
+        if margins:
+            lines += ["", "experiment %s: margins over other methods" % experiment]
+            lines += ["  " + line for line in wrapped(pm.who_wins(margins))]
+            lines += aligned(*pm.margin_cells(margins), left=2)
         lines.append("")
-    return "\n".join(lines + legend_lines(rows)) + "\n"
+    return "\n".join(lines + legend_lines(rows, experiments)) + "\n"
 
 
-def legend_lines(rows):
+def wrapped(sentences):
+    return [line for sentence in sentences for line in textwrap.wrap(sentence, WIDTH - 2)]
+
+
+def legend_lines(rows, experiments):
     """What the tables of returns mean."""
     lines = ["Returns are means over the training tasks, as mean ± standard deviation over seeds.",
              "PP: personal policies. MP: meta-policy. last: at the last round. AUC: mean over the",
@@ -160,13 +175,15 @@ def legend_lines(rows):
     if any(row["as_paper"] for row in rows):
         lines += ["paper, λ and paper, best: its table by λ and its table of best returns, beside runs",
                   "with its networks, batch and number of updates, whatever their other settings."]
+    if any(map(pms.are_compared, experiments.values())):
+        lines += pm.LEGEND
     return lines + pc.LEGEND + ["-: not run."]
 
 
 def learning_cells(rows):
-    """(heads, lines): a line for each group; test tasks have a column where there are any."""
+    """(heads, lines): a line for each group; PP and test tasks have columns where there are any."""
     shown = {head: keys for head, keys in LEARNING.items()
-             if head != "MP test last" or any(row[keys[0]] is not None for row in rows)}
+             if head not in NEEDED or any(row[NEEDED[head]] is not None for row in rows)}
     return ("group", "seeds") + tuple(shown), [
         (row["group"], str(row["seeds"])) + tuple(
             plus_minus(row[mean], row[spread]) for mean, spread in shown.values()) for row in rows]
@@ -352,11 +369,19 @@ def task_rows(experiment, groups):
     return rows
 
 
+def margins_csv(experiments):
+    """Or None, where there is nothing to compare."""
+    rows = [row for experiment, groups in experiments.items()
+            for row in pm.margin_rows(experiment, groups)]
+    return csv_text(pm.COLUMNS, rows) if rows else None
+
+
 def write_tables(experiments, rows, out):
     """Writes what there are rows for; returns the paths."""
     texts = {"summary.txt": summary_text(rows, experiments), "summary.csv": csv_text(COLUMNS, rows),
              "best_returns.tex": best_returns_tex(rows),
-             "lambda_table.tex": lambda_table_tex(experiments, rows)} if rows else {}
+             "lambda_table.tex": lambda_table_tex(experiments, rows),
+             "margins.csv": margins_csv(experiments)} if rows else {}
     written = []
     for name, text in texts.items():
         if text is not None:

@@ -42,7 +42,7 @@ def report(dirs, folder):
             body += [ph.heading(3, "Figures")] + figures_of({experiment: groups}, {})
         if rows:
             body += [ph.heading(2, "How to read the tables"),
-                     ph.paragraph(" ".join(pt.legend_lines(rows)))]
+                     ph.paragraph(" ".join(pt.legend_lines(rows, experiments)))]
         if convergence:
             body += ps.convergence_section(convergence, folder) + figures_of({}, convergence)
     names = list(experiments) + ["convergence"] * bool(convergence)

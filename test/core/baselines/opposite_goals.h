@@ -60,7 +60,7 @@ inline GoalReturns evaluateOnGoals(const MetaLearner& learner, const std::vector
   for (const int task : {0, 1}) {
     Evaluation evaluation(makeEnvs([&](int) { return family.make(task); }, 1));
     Rng rng(7, static_cast<std::uint64_t>(task), Stream::kEvaluate);
-    const std::unique_ptr<Adaptation> adaptation = learner.adapt(learner.model());
+    const std::unique_ptr<Adaptation> adaptation = learner.adapt(learner.model(), task);
     const auto all = evaluateAdapted(evaluation, *adaptation, counts, rng);
     result.returns.resize(all.size());
     for (std::size_t k = 0; k < all.size(); ++k) {

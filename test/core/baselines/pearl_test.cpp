@@ -207,7 +207,7 @@ TEST(Pearl, IsRegistered) {
   EXPECT_EQ(row.label, "PEARL");
   const auto kind = row.make();
   EXPECT_EQ(kind->explorationEpisodes(), (std::vector<int>{2}));
-  EXPECT_EQ(kind->unknownTask(), std::vector<float>(5));
+  EXPECT_EQ(kind->metaInput(-1, 2), std::vector<float>(5));
   const test::DensePoint env({1, 0});
   const auto learner = kind->make(test::oppositeGoals());
   EXPECT_EQ(kind->policies(env)->layout(), learner->policies().layout());

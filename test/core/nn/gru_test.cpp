@@ -4,13 +4,12 @@
 
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "../allocations.h"
 #include "../support.h"
+#include "baselines/oracle.h"
 #include "pmeta_core/base/rng.h"
 #include "pmeta_core/nn/initialisation.h"
 #include "pmeta_core/nn/kernels.h"
@@ -152,8 +151,7 @@ TEST_P(GruOf, StepsAreTheUnroll) {
 }
 
 TEST(Gru, HiddenStatesAgreeWithTheOracle) {
-  const auto oracle =
-      nlohmann::json::parse(std::ifstream(PMETA_TEST_DATA "/meta_oracles_rl2.json"));
+  const auto oracle = test::loadOracle("rl2_oracle.json");
   const Gru gru({"gru", oracle["inputs"], oracle["hidden"]});
   const auto parameters = oracle["theta_old"].get<std::vector<float>>();
   const std::size_t trials = oracle["trials"], steps = oracle["steps"];

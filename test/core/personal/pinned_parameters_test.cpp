@@ -3,6 +3,7 @@
 #include <string>
 
 #include "pmeta_core/experiment/experiment.h"
+#include "pmeta_core/nn/kernels.h"
 
 namespace pmeta {
 namespace {
@@ -21,22 +22,28 @@ constexpr char kSac[] =
     "context_hidden: [10, 8], latent_size: 3, context_batch: 20, context_buffer: 80, "
     "reward_scale: 5, ";
 
-class Parameters : public ::testing::TestWithParam<Pinned> {};
+class Parameters : public ::testing::TestWithParam<Pinned> {
+ protected:
+  ~Parameters() override { setKernels(kernelNames().front()); }
+};
 
-TEST_P(Parameters, AreThoseOfBefore) {
+TEST_P(Parameters, AreThoseOfBeforeWhateverTheKernels) {
   std::string text = GetParam().settings;
   const bool networks = text.find("q_learning") == std::string::npos;
   if (text.find("sac.") == 0) text = kSac + text.substr(4) + "}\n";
   if (networks) text += kPull + std::string("arithmetic: portable\n");
-  const auto learner = Experiment::parse(text, "pinned").makeLearner(1);
-  for (int round = 1; round <= 3; ++round) {
-    learner->beginRound(round == 1 ? learner->initialModel(3) : Model(learner->auxiliary()),
-                        round == 3);
-    Rng rng(3, 1, Stream::kSample, static_cast<std::uint64_t>(round));
-    for (int r = 0; r < 25; ++r) learner->update(rng);
+  for (const std::string& name : kernelNames()) {
+    setKernels(name);
+    const auto learner = Experiment::parse(text, "pinned").makeLearner(1);
+    for (int round = 1; round <= 3; ++round) {
+      learner->beginRound(round == 1 ? learner->initialModel(3) : Model(learner->auxiliary()),
+                          round == 3);
+      Rng rng(3, 1, Stream::kSample, static_cast<std::uint64_t>(round));
+      for (int r = 0; r < 25; ++r) learner->update(rng);
+    }
+    EXPECT_EQ(learner->personal().checksum(), GetParam().personal) << name;
+    EXPECT_EQ(learner->auxiliary().checksum(), GetParam().auxiliary) << name;
   }
-  EXPECT_EQ(learner->personal().checksum(), GetParam().personal);
-  EXPECT_EQ(learner->auxiliary().checksum(), GetParam().auxiliary);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -209,7 +209,7 @@ algorithms:
   EXPECT_EQ(value(quick, "promp.learning_rate"), "0.25");
   EXPECT_EQ(points({"preset:=only_here"}, more).settings().rounds, 3);
   EXPECT_EQ(errorOf([&] { points({"preset:=nothing"}, more); }),
-            "unknown preset 'nothing': points.yaml has quick, only_here.");
+            "unknown preset of points.yaml 'nothing'. Known are quick, only_here.");
   EXPECT_THAT(errorOf([&] { points({}, "algorithms: {prompt: {seed: 1}}\n"); }),
               HasSubstr("unknown algorithm 'prompt': did you mean 'promp'?"));
   // what is effective reads as itself

@@ -137,6 +137,17 @@ TEST_F(Sweep, WhatSomebodyElseWritesIsLeftAlone) {
   EXPECT_EQ(runStatus(runs.back().runDir()), "finished");
 }
 
+TEST_F(Sweep, SaysThatItWasStoppedAlsoBeforeItsFirstRunWasDone) {
+  valuesOf("seed:=3-4");
+  const auto run = [&](bool stop) {
+    return runSweep(plan_, std::atomic<bool>{stop}, [](const SweepProgress&) {});
+  };
+  const SweepResult stopped = run(true);
+  EXPECT_TRUE(stopped.stopped);
+  EXPECT_EQ(stopped.total, 2);
+  EXPECT_FALSE(run(false).stopped);
+}
+
 TEST_F(Sweep, ARunOfOtherSettingsIsNotTouched) {
   valuesOf("seed:=3-4");
   const std::string run = planSweep(plan_).back().runDir();

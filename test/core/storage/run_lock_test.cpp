@@ -1,20 +1,45 @@
 #include "pmeta_core/storage/run_lock.h"
 
+#include <dlfcn.h>
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstdarg>
 #include <filesystem>
 
 #include "../support.h"
 #include "pmeta_core/storage/run_log.h"
+
+namespace {
+
+bool g_can_lock = true;
+
+}  // namespace
+
+// stands before the system's own: a file system that cannot lock, e.g. NFS without its daemon
+extern "C" int fcntl(int fd, int command, ...) {
+  static const auto own = reinterpret_cast<decltype(&fcntl)>(dlsym(RTLD_NEXT, "fcntl"));
+  va_list arguments;
+  va_start(arguments, command);
+  void* const argument = va_arg(arguments, void*);
+  va_end(arguments);
+  if (!g_can_lock && (command == F_OFD_SETLK || command == F_OFD_GETLK)) {
+    errno = ENOLCK;
+    return -1;
+  }
+  return own(fd, command, argument);
+}
 
 namespace pmeta {
 namespace {
 
 using test::errorOf;
 using test::gridExperiment;
+using test::readFile;
 using test::TempDir;
 using test::writeFile;
 
@@ -103,6 +128,99 @@ TEST(RunLock, AFileThatNamesALivingProcessCountsWithoutLocks) {
             "");
   EXPECT_EQ(names("{\"pid\": 7, \"host\": \"elsewhere\"}"), "process 7 on host elsewhere");
   EXPECT_EQ(names("{\"pid\": \"x\"}"), "another process");
+}
+
+class WithoutLocks : public ::testing::Test {
+ protected:
+  WithoutLocks() { g_can_lock = false; }
+  ~WithoutLocks() override { g_can_lock = true; }
+
+  // what a process leaves behind that is killed while it has the folder
+  std::string leftBehind() {
+    Other other(dir_.path());
+    other.kill();
+    return readFile(dir_ / "lock.process");
+  }
+
+  TempDir dir_;
+};
+
+TEST_F(WithoutLocks, TheFileHoldsTheFolderUntilItsProcessHasDied) {
+  {
+    const RunLock lock(dir_.path());
+    EXPECT_EQ(lock.path(), dir_ / "lock.process");
+    EXPECT_EQ(RunLock::holder(dir_.path()), me());
+    EXPECT_EQ(errorOf([&] { RunLock second(dir_.path()); }),
+              "the run folder " + dir_.path() + " is being written by " + me() +
+                  ", and its file system cannot lock files: if that process is gone, remove " +
+                  (dir_ / "lock.process") + ".");
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(dir_.path()));
+  {
+    Other other(dir_.path());
+    EXPECT_EQ(RunLock::holder(dir_.path()), other.text());
+    EXPECT_NE(errorOf([&] { RunLock lock(dir_.path()); }).find(other.text()), std::string::npos);
+  }
+  EXPECT_NE(readFile(dir_ / "lock.process"), "") << "nobody removed it";
+  EXPECT_EQ(RunLock::holder(dir_.path()), "");
+  { const RunLock lock(dir_.path()); }
+  EXPECT_TRUE(std::filesystem::is_empty(dir_.path()));
+}
+
+TEST_F(WithoutLocks, CountForWhomCanLockToo) {
+  Other other(dir_.path());
+  g_can_lock = true;
+  EXPECT_NE(errorOf([&] { RunLock lock(dir_.path()); }).find(other.text()), std::string::npos);
+  other.kill();
+  { const RunLock lock(dir_.path()); }
+}
+
+// how many of `starters` processes that begin at one moment get the folder; all keep it until each
+// has tried
+int takers(const std::string& dir, int starters) {
+  int begin[2], tried[2], end[2];
+  EXPECT_EQ(0, ::pipe(begin) + ::pipe(tried) + ::pipe(end));
+  for (int i = 0; i < starters; ++i) {
+    if (::fork() != 0) continue;
+    ::close(begin[1]);
+    ::close(end[1]);
+    char byte = 0;
+    (void)!::read(begin[0], &byte, 1);  // until the parent closes it
+    try {
+      const RunLock lock(dir);
+      (void)!::write(tried[1], "1", 1);
+      (void)!::read(end[0], &byte, 1);
+    } catch (const FolderInUse&) {
+      (void)!::write(tried[1], "0", 1);
+    }
+    ::_exit(0);
+  }
+  ::close(begin[1]);
+  int count = 0;
+  for (int i = 0; i < starters; ++i) {
+    char got = 0;
+    EXPECT_EQ(1, ::read(tried[0], &got, 1));
+    count += got == '1';
+  }
+  ::close(end[1]);
+  while (::wait(nullptr) > 0) {
+  }
+  for (const int fd : {begin[0], tried[0], tried[1], end[0]}) ::close(fd);
+  return count;
+}
+
+TEST(RunLock, OneOfManyThatStartAtOnceHasTheFolder) {
+  const TempDir dir;
+  for (int k = 0; k < 10; ++k) EXPECT_EQ(takers(dir.path(), 4), 1);
+}
+
+TEST_F(WithoutLocks, OneOfManyThatStartAtOnceHasTheFolder) {
+  for (int k = 0; k < 10; ++k) EXPECT_EQ(takers(dir_.path(), 4), 1);
+  const std::string left = leftBehind();
+  for (int k = 0; k < 60; ++k) {
+    writeFile(dir_ / "lock.process", left);
+    EXPECT_EQ(takers(dir_.path(), 4), 1) << "beside what a dead process left";
+  }
 }
 
 TEST(RunLog, AFolderThatIsBeingWrittenIsNeitherWrittenNorResumed) {

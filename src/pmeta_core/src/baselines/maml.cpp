@@ -125,7 +125,7 @@ IterationStats Maml::iterate(std::uint64_t seed, std::uint64_t iteration) {
   return stats;
 }
 
-std::unique_ptr<Adaptation> Maml::adapt(const Model& policy) const {
+std::unique_ptr<Adaptation> Maml::adapt(const Model& policy, int) const {
   return std::make_unique<GradientAdaptation>(policies_, settings_, policy);
 }
 

@@ -119,7 +119,7 @@ std::int64_t Pearl::brokenEpisodes() const {
   return count;
 }
 
-std::unique_ptr<Adaptation> Pearl::adapt(const Model& policy) const {
+std::unique_ptr<Adaptation> Pearl::adapt(const Model& policy, int) const {
   return std::make_unique<LatentAdaptation>(networks(), settings_.sac.context,
                                             policy.floats().data());
 }
@@ -150,11 +150,11 @@ std::unique_ptr<MetaLearner> PearlKind::make(const MetaTasks& tasks) const {
   return std::make_unique<Pearl>(tasks, settings_);
 }
 
-std::unique_ptr<PolicyFamily> PearlKind::policies(const Env& env) const {
+std::unique_ptr<PolicyFamily> PearlKind::policies(const Env& env, int) const {
   return std::make_unique<SacPolicies>(env.spec(), settings_.sac, 1);
 }
 
-std::vector<float> PearlKind::unknownTask() const {
+std::optional<std::vector<float>> PearlKind::metaInput(int, int) const {
   return std::vector<float>(static_cast<std::size_t>(settings_.sac.context.latent_size));
 }
 

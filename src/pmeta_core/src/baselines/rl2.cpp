@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "pmeta_core/baselines/advantages.h"
 #include "pmeta_core/baselines/rl2_actor.h"
 
 namespace pmeta {
@@ -21,29 +22,25 @@ std::size_t largestMinibatch(const Rl2Settings& settings) {
                                   settings.minibatches);
 }
 
+PpoSettings ppoSettings(const Rl2Settings& settings) {
+  PpoSettings ppo = settings.ppo;
+  if (settings.baseline == "linear") ppo.value_coefficient = 0;
+  return ppo;
+}
+
 EnvSpec specOf(const MetaTasks& tasks) { return tasks.family->make(0)->spec(); }
 
 }  // namespace
 
-void generalisedAdvantages(const float* rewards, const float* values, std::size_t steps,
-                           double gamma, double lambda, float* advantages) {
-  double next_value = 0, advantage = 0;
-  for (std::size_t t = steps; t-- > 0;) {
-    const double delta = rewards[t] + gamma * next_value - values[t];
-    advantage = delta + gamma * lambda * advantage;
-    advantages[t] = static_cast<float>(advantage);
-    next_value = values[t];
-  }
-}
-
 Rl2::Rl2(const MetaTasks& tasks, const Rl2Settings& settings)
     : settings_(settings),
+      num_tasks_(tasks.count()),
       policies_(specOf(tasks), settings),
       model_(policies_.layout()),
       adam_(model_.floats().data(), nullptr, model_.size(), adamSettings(settings)),
       sampler_(tasks, policies_.networks(), settings.episodes,
                static_cast<std::size_t>(settings.trials)),
-      update_(policies_.networks(), settings.ppo, largestMinibatch(settings),
+      update_(policies_.networks(), ppoSettings(settings), largestMinibatch(settings),
               static_cast<std::size_t>(settings.episodes * specOf(tasks).horizon)),
       losses_{{"last_episode_return", 0},
               {"first_episode_return", 0},
@@ -93,17 +90,7 @@ void Rl2::makeTargets() {
     update_.evaluate(model_.floats().data(), trials_, minibatch_, targets_);
   }
   if (settings_.scale_rewards) scaleRewards();
-  for (const std::size_t k : order_) {
-    const Trial& trial = trials_[k];
-    TrialTargets& targets = targets_[k];
-    targets.advantages.resize(trial.steps);
-    targets.returns.resize(trial.steps);
-    generalisedAdvantages(trial.rewards.data(), targets.values.data(), trial.steps, settings_.gamma,
-                          settings_.gae_lambda, targets.advantages.data());
-    for (std::size_t t = 0; t < trial.steps; ++t) {
-      targets.returns[t] = targets.advantages[t] + targets.values[t];
-    }
-  }
+  settings_.baseline == "linear" ? linearAdvantages() : valueAdvantages();
   normaliseAdvantages();
 }
 
@@ -120,6 +107,54 @@ void Rl2::scaleRewards() {
   for (const std::size_t k : order_) {
     for (std::size_t t = 0; t < trials_[k].steps; ++t) {
       trials_[k].rewards[t] = static_cast<float>(scale * trials_[k].rewards[t]);
+    }
+  }
+}
+
+void Rl2::valueAdvantages() {
+  for (const std::size_t k : order_) {
+    const Trial& trial = trials_[k];
+    TrialTargets& targets = targets_[k];
+    targets.advantages.resize(trial.steps);
+    targets.returns.resize(trial.steps);
+    generalisedAdvantages(trial.rewards.data(), targets.values.data(), trial.steps, settings_.gamma,
+                          settings_.gae_lambda, targets.advantages.data());
+    for (std::size_t t = 0; t < trial.steps; ++t) {
+      targets.returns[t] = targets.advantages[t] + targets.values[t];
+    }
+  }
+}
+
+// a baseline for each task, over the steps of whole trials
+void Rl2::linearAdvantages() {
+  const std::size_t inputs = policies_.networks().gru().inputs();
+  const std::size_t size = policies_.networks().observationSize();
+  for (int task = 0; task < num_tasks_; ++task) {
+    std::vector<Path> paths;
+    std::vector<std::size_t> of_task;
+    for (const std::size_t k : order_) {
+      const Trial& trial = trials_[k];
+      if (trial.task != task) continue;
+      of_task.push_back(k);
+      Path path;
+      for (std::size_t t = 0; t < trial.steps; ++t) {
+        const float* observation = &trial.inputs[t * inputs];
+        path.observations.insert(path.observations.end(), observation, observation + size);
+        path.rewards.push_back(trial.rewards[t]);
+      }
+      path.last_observation.resize(size);  // nothing is worth anything there
+      paths.push_back(std::move(path));
+    }
+    if (paths.empty()) continue;
+    LinearBaseline baseline;
+    baseline.fit(paths, settings_.gamma);
+    const auto all = advantages(paths, baseline, {settings_.gamma, settings_.gae_lambda});
+    auto next = all.begin();
+    for (const std::size_t k : of_task) {
+      const auto end = next + static_cast<std::ptrdiff_t>(trials_[k].steps);
+      targets_[k].advantages.assign(next, end);
+      targets_[k].returns = targets_[k].values;  // the critic stays as it is
+      next = end;
     }
   }
 }
@@ -180,7 +215,7 @@ void Rl2::move() {
   adam_.apply(0, gradient_.data(), gradient_.size());
 }
 
-std::unique_ptr<Adaptation> Rl2::adapt(const Model& policy) const {
+std::unique_ptr<Adaptation> Rl2::adapt(const Model& policy, int) const {
   return std::make_unique<Rl2Adaptation>(policies_.networks(), policy.floats().data());
 }
 

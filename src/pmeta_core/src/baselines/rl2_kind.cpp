@@ -14,10 +14,9 @@ class Rl2Kind : public MetaLearnerKind {
   std::unique_ptr<MetaLearner> make(const MetaTasks& tasks) const override {
     return std::make_unique<Rl2>(tasks, settings_);
   }
-  std::unique_ptr<PolicyFamily> policies(const Env& env) const override {
+  std::unique_ptr<PolicyFamily> policies(const Env& env, int) const override {
     return std::make_unique<Rl2Policies>(env.spec(), settings_);
   }
-  std::vector<float> unknownTask() const override { return {}; }
 
  private:
   Rl2Settings settings_;

@@ -21,6 +21,10 @@ void bind(Settings& s, const std::string& prefix, Rl2Settings& d) {
   s.bind(prefix + "gamma", d.gamma, "discount, over the whole trial", Range::between(0, 1));
   s.bind(prefix + "gae_lambda", d.gae_lambda, "lambda of advantages, over the whole trial",
          Range::between(0, 1));
+  s.bind(prefix + "baseline", d.baseline,
+         "of advantages: value (the critic), or linear in features of observation and step, fitted "
+         "to each task's trials; the critic then learns nothing",
+         {"value", "linear"});
   s.bind(prefix + "scale_rewards", d.scale_rewards,
          "divides rewards by the running deviation of the discounted return");
   s.bind(prefix + "learning_rate", d.learning_rate, "Adam's step size", Range::above(0));

@@ -1,10 +1,12 @@
 #include "pmeta_core/baselines/trials.h"
 
 #include <algorithm>
+#include <numeric>
 #include <string>
 #include <utility>
 
 #include "pmeta_core/act/rollout.h"
+#include "pmeta_core/baselines/for_each_task.h"
 #include "pmeta_core/baselines/rl2_actor.h"
 
 namespace pmeta {
@@ -72,7 +74,8 @@ class TrialSampler::OneTask : private Actor {
 };
 
 TrialSampler::TrialSampler(const MetaTasks& tasks, const Rl2Networks& networks, int episodes,
-                           std::size_t max_trials) {
+                           std::size_t max_trials)
+    : threads_(tasks.threads) {
   const auto count = static_cast<std::size_t>(tasks.count());
   const auto side_by_side = static_cast<int>((max_trials + count - 1) / count);
   for (int task = 0; task < tasks.count(); ++task) {
@@ -88,16 +91,20 @@ void TrialSampler::play(const float* parameters, std::uint64_t seed, std::uint64
   std::vector<std::vector<Trial*>> of_task(tasks_.size());
   const std::uint64_t first = iteration % tasks_.size() * trials.size();
   for (std::size_t k = 0; k < trials.size(); ++k) {
-    of_task[(first + k) % tasks_.size()].push_back(&trials[k]);
+    const std::size_t task = (first + k) % tasks_.size();
+    trials[k].task = static_cast<int>(task);
+    of_task[task].push_back(&trials[k]);
   }
   stats.env_steps.resize(tasks_.size());
-  for (std::size_t task = 0; task < tasks_.size(); ++task) {
-    if (of_task[task].empty()) continue;
+  std::vector<std::int64_t> broken(tasks_.size());
+  forEachTask(tasks_.size(), threads_, [&](std::size_t task) {
+    if (of_task[task].empty()) return;
     Rng rng(seed, task, Stream::kCollect, iteration);
-    const std::int64_t broken = tasks_[task]->broken().count();
+    const std::int64_t before = tasks_[task]->broken().count();
     stats.env_steps[task] += tasks_[task]->play(parameters, of_task[task], rng);
-    stats.broken_episodes += tasks_[task]->broken().count() - broken;
-  }
+    broken[task] = tasks_[task]->broken().count() - before;
+  });
+  stats.broken_episodes += std::accumulate(broken.begin(), broken.end(), std::int64_t{0});
 }
 
 void TrialSampler::saveState(StateWriter& writer) const {

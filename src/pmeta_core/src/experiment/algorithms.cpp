@@ -28,11 +28,7 @@ const Algorithm& algorithmNamed(const std::string& name) {
     algorithm.meaning = row->meaning;
     return algorithm;
   }
-  const std::vector<std::string> known = algorithmNames();
-  const std::string guess = nearest(name, known);
-  throw Error("unknown algorithm '" + name + "'" +
-              (guess.empty() ? "." : ": did you mean '" + guess + "'?") + " Known are " +
-              join(known) + ".");
+  throw Error(unknownName("algorithm", name, algorithmNames()));
 }
 
 namespace {
@@ -55,7 +51,8 @@ Algorithm modelAveraging() {
   return row;
 }
 
-// Li et al., "Federated Optimization in Heterogeneous Networks", 2020, with the pull as pMeta has it
+// Li et al., "Federated Optimization in Heterogeneous Networks", 2020, with the pull as pMeta has
+// it
 Algorithm fedProx() {
   Algorithm row;
   row.label = "FedProx";

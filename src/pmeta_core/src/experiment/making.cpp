@@ -10,7 +10,8 @@
 namespace pmeta {
 
 int Experiment::numTestTasks() const {
-  const bool serves = hasMetaLearner() || (evaluatesMeta() && learner_->servesTestTasks());
+  const bool serves = hasMetaLearner() ? meta_learner_->servesTestTasks()
+                                       : evaluatesMeta() && learner_->servesTestTasks();
   return serves ? family_->numTestTasks() : 0;
 }
 
@@ -56,7 +57,7 @@ Model Experiment::initialModel() const {
   const auto seed = static_cast<std::uint64_t>(settings_.seed);
   if (!hasMetaLearner()) return makeLearner(0)->initialModel(seed);
   const std::unique_ptr<Env> env = family_->make(0);
-  const std::unique_ptr<PolicyFamily> policies = meta_learner_->policies(*env);
+  const std::unique_ptr<PolicyFamily> policies = meta_learner_->policies(*env, numTasks());
   Model model(policies->layout());
   Rng rng(seed, 0, Stream::kInitialise);
   policies->initialise(model, rng);
@@ -64,7 +65,8 @@ Model Experiment::initialModel() const {
 }
 
 std::unique_ptr<PolicyFamily> Experiment::policies(const Env& env) const {
-  return hasMetaLearner() ? meta_learner_->policies(env) : learner_->policies(env, numTasks());
+  return hasMetaLearner() ? meta_learner_->policies(env, numTasks())
+                          : learner_->policies(env, numTasks());
 }
 
 const std::string& Experiment::policyFiles() const {
@@ -73,7 +75,7 @@ const std::string& Experiment::policyFiles() const {
 }
 
 std::optional<std::vector<float>> Experiment::metaInput(int task) const {
-  if (hasMetaLearner()) return meta_learner_->unknownTask();
+  if (hasMetaLearner()) return meta_learner_->metaInput(task, numTasks());
   return learner_->metaInput(task, numTasks());
 }
 

@@ -81,8 +81,8 @@ std::vector<YAML::Node> layersOf(YAML::Node base, const std::string& source,
   // effective settings name the preset they came from, which is part of them already
   const bool effective = !presets && peek({base}, {}, "", "preset", "") == preset;
   if (preset.empty() || !of_preset.empty() || effective) return layers;
-  throw Error("unknown preset '" + preset + "': " + source +
-              (known.empty() ? " has none." : " has " + join(known) + "."));
+  if (known.empty()) throw Error("unknown preset " + shown(preset) + ": " + source + " has none.");
+  throw Error(unknownName("preset of " + source, preset, known));
 }
 
 // a meta-learner has none of the agents' settings: what a file says of them is for the others

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/learn/gradient_surgery.h"
 #include "pmeta_core/learn/sac_losses.h"
 #include "pmeta_core/nn/kernels.h"
 
@@ -54,6 +55,12 @@ SacUpdate::SacUpdate(const SacNetworks& networks, const SacSettings& settings,
       d_action_(batch_ * action_size_),
       d_heads_(2 * batch_ * action_size_),
       gradient_(std::max(networks_.actor().size(), networks_.critic(0).size())) {
+  if (settings.surgery_tasks > 0) {
+    surgery_.emplace().gradients.resize(static_cast<std::size_t>(settings.surgery_tasks));
+    for (const Mlp* network : {&networks_.actor(), &networks_.critic(0), &networks_.critic(1)}) {
+      surgery_->workspaces.emplace(network, MlpWorkspace(*network, batch_));
+    }
+  }
   if (settings.task_encoding == "given") {
     d_task_input_.resize(batch_ * networks_.taskInputSize());
     d_latent_rows_.resize(d_task_input_.size());
@@ -119,11 +126,11 @@ SacLosses SacUpdate::apply(const float* parameters, Optimizer<float>& optimizer,
   computeTargets();
 
   SacLosses losses;
-  for (int k = 0; k < 2; ++k) losses.critic += 0.5 * updateCritic(k, parameters, optimizer);
+  for (int k = 0; k < 2; ++k) losses.critic += 0.5 * updateCritic(k, parameters, optimizer, rng);
   if (networks_.hasEncoder()) losses.kl = updateEncoder(parameters, optimizer);
   judgeActions(parameters);
   if (networks_.hasValue()) losses.value = updateValue(parameters, optimizer);
-  losses.actor = updateActor(parameters, optimizer);
+  losses.actor = updateActor(parameters, optimizer, rng);
 
   double mean_log_prob = 0;
   for (std::size_t b = 0; b < batch_; ++b) mean_log_prob += policy_.logProbs()[b];
@@ -164,7 +171,29 @@ void SacUpdate::putActions(const float* actions, AlignedFloats& critic_input) co
   }
 }
 
-double SacUpdate::updateCritic(int k, const float* parameters, Optimizer<float>& optimizer) {
+// The gradient of a network whose rows are of several tasks, with surgery between them, into
+// gradient_. Costs a forward pass more.
+void SacUpdate::operateOn(const Mlp& network, const float* parameters, const float* input,
+                          const float* d_output, Rng& rng) {
+  const std::size_t tasks = surgery_->gradients.size();
+  MlpWorkspace& workspace = surgery_->workspaces.at(&network);
+  const auto first = [&](std::size_t task) { return (task * batch_ + tasks - 1) / tasks; };
+  for (std::size_t task = 0; task < tasks; ++task) {
+    const std::size_t begin = first(task);
+    const std::size_t rows = first(task + 1) - begin;
+    AlignedFloats& gradient = surgery_->gradients[task];
+    gradient.resize(network.size());
+    const float* of_task = input + begin * network.inputs();
+    network.forward(parameters, of_task, rows, workspace);
+    network.backward(parameters, of_task, rows, d_output + begin * network.outputs(),
+                     gradient.data(), nullptr, workspace);
+  }
+  surgery_->scratch.resize(network.size());
+  operate(surgery_->gradients, rng, surgery_->scratch, gradient_.data());
+}
+
+double SacUpdate::updateCritic(int k, const float* parameters, Optimizer<float>& optimizer,
+                               Rng& rng) {
   const Mlp& critic = networks_.critic(k);
   const float* theta = parameters + networks_.criticOffset(k);
   MlpWorkspace& workspace = critic_workspaces_[static_cast<std::size_t>(k)];
@@ -175,6 +204,7 @@ double SacUpdate::updateCritic(int k, const float* parameters, Optimizer<float>&
   critic.backward(theta, critic_input_.data(), batch_, d_q_.data(), gradient_.data(),
                   observation_size_, latent, latent == 0 ? nullptr : d_latent_rows_.data(),
                   workspace);
+  if (surgery_) operateOn(critic, theta, critic_input_.data(), d_q_.data(), rng);
   for (std::size_t i = 0; i < d_task_input_.size(); ++i) d_task_input_[i] += d_latent_rows_[i];
   for (std::size_t b = 0; b < batch_ && !tasks_.empty(); ++b) {
     float* d_z = taskOf(b).d_z.data();
@@ -228,7 +258,7 @@ double SacUpdate::updateValue(const float* parameters, Optimizer<float>& optimiz
   return loss;
 }
 
-double SacUpdate::updateActor(const float* parameters, Optimizer<float>& optimizer) {
+double SacUpdate::updateActor(const float* parameters, Optimizer<float>& optimizer, Rng& rng) {
   const double alpha = temperature_.value();
   double loss = actorLoss(q_[0], q_[1], policy_.logProbs(), alpha, batch_);
   const auto n = static_cast<float>(batch_);
@@ -237,8 +267,12 @@ double SacUpdate::updateActor(const float* parameters, Optimizer<float>& optimiz
 
   policy_.backward(batch_, d_action_.data(), static_cast<float>(alpha) / n, d_heads_.data());
   if (head_penalty_ > 0) loss += policy_.addPenalty(batch_, head_penalty_, d_heads_.data());
-  networks_.actor().backward(parameters, actor_input_.data(), batch_, d_heads_.data(),
-                             gradient_.data(), nullptr, actor_workspace_);
+  if (surgery_) {
+    operateOn(networks_.actor(), parameters, actor_input_.data(), d_heads_.data(), rng);
+  } else {
+    networks_.actor().backward(parameters, actor_input_.data(), batch_, d_heads_.data(),
+                               gradient_.data(), nullptr, actor_workspace_);
+  }
   optimizer.apply(0, gradient_.data(), networks_.actor().size());
   return loss;
 }

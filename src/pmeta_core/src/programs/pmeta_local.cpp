@@ -235,16 +235,10 @@ int sweep(Arguments arguments) {
   plan.resume = arguments.resume;
   if (arguments.dry_run) return listSweep(plan);
   int found = 0;
-  int elsewhere = 0;
-  int done = 0;
-  int total = 0;
   const pmeta::SweepResult result =
       pmeta::runSweep(plan, pmeta::stopSignalled(), [&](const pmeta::SweepProgress& progress) {
-        done = progress.done;
-        total = progress.total;
         if (!progress.in_use.empty()) std::cerr << "left out: " << progress.in_use << std::endl;
         if (progress.skipped) ++found;
-        if (!progress.in_use.empty()) ++elsewhere;
         if (progress.skipped || !progress.in_use.empty()) return;
         std::printf("[%d/%d] %s  PP %s  MP %s  %s  ETA %s\n", progress.done, progress.total,
                     progress.run_id.c_str(), shortNumber(progress.personal_return).c_str(),
@@ -253,22 +247,22 @@ int sweep(Arguments arguments) {
         std::fflush(stdout);
       });
   if (found > 0) std::cout << found << " runs had been finished before\n";
-  if (elsewhere > 0) {
-    std::cerr << elsewhere << " runs were left to whom else writes them: the same command sees to "
+  if (result.in_use > 0) {
+    std::cerr << result.in_use
+              << " runs were left to whom else writes them: the same command sees to "
               << "what that leaves" << std::endl;
   }
   const int failed = static_cast<int>(result.failures.size());
-  const bool stopped = done + elsewhere + failed < total;
-  std::cout << (stopped ? "stopped; the same command goes on. Runs in " : "runs in ")
+  std::cout << (result.stopped ? "stopped; the same command goes on. Runs in " : "runs in ")
             << result.folder << std::endl;
   for (const pmeta::SweepFailure& failure : result.failures) {
     std::cerr << failure.run_id << ": " << failure.reason << "\n";
   }
   if (failed > 0) {
-    std::cerr << "pmeta: " << failed << " of " << total
+    std::cerr << "pmeta: " << failed << " of " << result.total
               << " runs failed; the same command tries them again." << std::endl;
   }
-  return stopped ? 130 : (elsewhere + failed > 0 ? 1 : 0);
+  return result.stopped ? 130 : (result.in_use + failed > 0 ? 1 : 0);
 }
 
 int check(Arguments arguments) {

@@ -34,6 +34,7 @@ std::string bytesText(double bytes) {
 
 RunConsole::RunConsole(const Experiment& experiment, bool terminal)
     : num_tasks_(experiment.numTasks()),
+      has_personal_(!experiment.hasMetaLearner()),
       rounds_(experiment.settings().rounds),
       adapted_(experiment.contextEpisodes().back()),
       terminal_(terminal),
@@ -118,8 +119,8 @@ std::string RunConsole::take(const RoundBook::Round& round) {
   if (!round.rows.empty()) {
     evaluated_ = true;
     takeRows(round);
-    line +=
-        "  PP " + shortNumber(summary.personal_return) + "  MP " + shortNumber(summary.meta_return);
+    if (has_personal_) line += "  PP " + shortNumber(summary.personal_return);
+    line += "  MP " + shortNumber(summary.meta_return);
     if (num_tasks_ < static_cast<int>(tasks_.size())) {
       line += "  test " + shortNumber(summary.test_return);
     }
@@ -138,7 +139,8 @@ std::string RunConsole::tableLine(const std::string& name, const Courses& course
     return padded(shortNumber(course.last), kNumberWidth, true) +
            padded(bestText(course.best, course.best_round), kBestWidth, true);
   };
-  return padded(name, width) + columns(courses.personal) + columns(courses.meta) + "\n";
+  return padded(name, width) + (has_personal_ ? columns(courses.personal) : "") +
+         columns(courses.meta) + "\n";
 }
 
 std::string RunConsole::table() const {
@@ -156,7 +158,7 @@ std::string RunConsole::table() const {
     return padded(policy + " last", kNumberWidth, true) +
            padded(policy + " best (round)", kBestWidth, true);
   };
-  std::string text = padded("task", width) + heads("PP") + heads("MP") + "\n";
+  std::string text = padded("task", width) + (has_personal_ ? heads("PP") : "") + heads("MP") + "\n";
   for (std::size_t task = 0; task < tasks_.size(); ++task) {
     text += tableLine(labels[task], tasks_[task], width);
   }

@@ -146,7 +146,7 @@ std::vector<TaskReturn> MetaTrainer::evaluateTask(int task, const MetaPolicy& me
                                                   const Model& model,
                                                   std::unique_ptr<Adaptation>& adaptation) {
   const Stopwatch watch;
-  adaptation = learner_->adapt(model);
+  adaptation = learner_->adapt(model, task);
   std::vector<int> counts = experiment_.contextEpisodes();
   counts.erase(counts.begin());
   Rng rng = evaluationRng(task);

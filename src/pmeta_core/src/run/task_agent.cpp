@@ -78,6 +78,7 @@ std::optional<RoundResult> TaskAgent::trainRound(const MetaPolicy& meta,
                                      }));
     personal.broken_episodes += unreported_broken_;
     personal.scheduled = scheduled;
+    personal.losses = result.losses;
     personal.env_steps = env_steps_;
     personal.updates = updates_;
     personal.seconds = watch.seconds();

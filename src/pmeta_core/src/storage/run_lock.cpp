@@ -12,6 +12,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -115,23 +116,47 @@ struct File {
                     ": wait until that has ended, or stop it.");
 }
 
-// only one can make a file that is not there; what a process that has died left behind is removed
+// whom the file names that counts where locks do not; nothing if there is none, or if that process
+// has died
+std::optional<Holder> livingHolder(const std::string& run_dir) {
+  const File file{::open((run_dir + kWithoutLocks).c_str(), O_RDONLY | O_CLOEXEC)};
+  if (file.fd < 0) return std::nullopt;
+  const Holder holder = readHolder(file.fd);
+  return holder.alive() ? std::optional<Holder>(holder) : std::nullopt;
+}
+
+[[noreturn]] void refuseWithoutLocks(const std::string& run_dir, const std::string& who,
+                                     const std::string& path) {
+  throw FolderInUse("the run folder " + run_dir + " is being written by " + who +
+                    ", and its file system cannot lock files: if that process is gone, remove " +
+                    path + ".");
+}
+
+// Removes what a process that has died left behind. One at a time: of two that read the same file,
+// the slower one would remove that of the quicker one, which has the folder by then. False if the
+// system cannot, see errno.
+bool clearAway(const std::string& run_dir) {
+  const std::string path = run_dir + kWithoutLocks;
+  const std::string clearing = path + ".clearing";
+  const File turn{::open(clearing.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)};
+  if (turn.fd < 0) {
+    if (errno != EEXIST) return false;
+    refuseWithoutLocks(run_dir, "another process", clearing);
+  }
+  const auto holder = livingHolder(run_dir);
+  if (!holder) ::unlink(path.c_str());
+  ::unlink(clearing.c_str());
+  if (holder) refuseWithoutLocks(run_dir, holder->text(), path);
+  return true;
+}
+
+// only one can make a file that is not there
 int takeWithoutLocks(const std::string& run_dir) {
   const std::string path = run_dir + kWithoutLocks;
-  for (int attempt = 0; attempt < 2; ++attempt) {
+  while (true) {
     const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd >= 0 || errno != EEXIST) return fd;
-    const File file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
-    if (file.fd < 0) continue;
-    const Holder holder = readHolder(file.fd);
-    if (holder.alive()) {
-      throw FolderInUse(
-          "the run folder " + run_dir + " is being written by " + holder.text() +
-          ", and its file system cannot lock files: if that process is gone, remove " + path + ".");
-    }
-    ::unlink(path.c_str());
+    if (fd >= 0 || errno != EEXIST || !clearAway(run_dir)) return fd;
   }
-  return -1;
 }
 
 }  // namespace
@@ -141,7 +166,12 @@ RunLock::RunLock(const std::string& run_dir) : path_(run_dir + kLock) {
     File file{::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)};
     struct flock lock = wholeFile();
     if (file.fd >= 0 && ::fcntl(file.fd, F_OFD_SETLK, &lock) == 0) {
-      if (isStill(file.fd, path_)) fd_ = file.keep();
+      if (!isStill(file.fd, path_)) continue;
+      if (const auto other = livingHolder(run_dir)) {
+        ::unlink(path_.c_str());
+        refuse(run_dir, *other);  // to whom the file system cannot lock
+      }
+      fd_ = file.keep();
       continue;
     }
     const int error = errno;
@@ -191,10 +221,8 @@ std::string RunLock::holder(const std::string& run_dir) {
   if (locked.fd >= 0 && ::fcntl(locked.fd, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK) {
     return readHolder(locked.fd).text();
   }
-  const File named{::open((run_dir + kWithoutLocks).c_str(), O_RDONLY | O_CLOEXEC)};
-  if (named.fd < 0) return "";
-  const Holder holder = readHolder(named.fd);
-  return holder.alive() ? holder.text() : "";
+  const auto holder = livingHolder(run_dir);
+  return holder ? holder->text() : "";
 }
 
 std::string hostName() {

@@ -179,23 +179,27 @@ void PartyNode::train() {
   }
 }
 
+void PartyNode::evaluate(const pmeta::MetaPolicy& meta) {
+  if (meta.round == 0 || !experiment_.evaluatesMeta() ||
+      !(meta.evaluate || experiment_.evaluationSchedule().includes(meta.round))) {
+    return;
+  }
+  setState(AgentStatus::EVALUATING,
+           "evaluating the meta-policy of round " + std::to_string(meta.round));
+  for (const pmeta::TaskReturn& result : party_->evaluateMeta(meta)) deliver(result);
+  for (const auto& [task, publisher] : trajectory_pubs_) {
+    publishEpisode(party_->recordMeta(meta, task), task, meta.round, pmeta::PolicyKind::kMeta);
+  }
+}
+
 void PartyNode::trainFrom(const pmeta::MetaPolicy& meta) {
   const int rounds = experiment_.settings().rounds;
   waitForAggregator();
-  if (meta.round > 0 && experiment_.evaluatesMeta() &&
-      (meta.evaluate || experiment_.evaluationSchedule().includes(meta.round))) {
-    setState(AgentStatus::EVALUATING,
-             "evaluating the meta-policy of round " + std::to_string(meta.round));
-    for (const pmeta::TaskReturn& result : party_->evaluateMeta(meta)) deliver(result);
-    for (const auto& [task, publisher] : trajectory_pubs_) {
-      publishEpisode(party_->recordMeta(meta, task), task, meta.round, pmeta::PolicyKind::kMeta);
-    }
-  }
+  evaluate(meta);
   if (meta.round >= rounds) {
     setState(AgentStatus::DONE, "all " + std::to_string(rounds) + " rounds are done");
     return;
   }
-
   if (!party_->trains()) {
     setState(AgentStatus::WAITING,
              "test task: waiting for the meta-policy of round " + std::to_string(meta.round + 1));

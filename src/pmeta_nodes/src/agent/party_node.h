@@ -65,6 +65,7 @@ class PartyNode {
   bool isAuthentic(const std::string& kind, pmeta::Authenticity authenticity);
 
   void train();
+  void evaluate(const pmeta::MetaPolicy& meta);
   void trainFrom(const pmeta::MetaPolicy& meta);
   void returnTo(const pmeta::MetaPolicy& meta);
   void saveCheckpoint(int round);

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "pmeta_core/nn/held_signals.h"
+
 namespace pmeta_nodes {
 namespace {
 
@@ -47,6 +49,8 @@ bool MasterWatch::waitFor(std::chrono::duration<double> time) {
 
 void MasterWatch::watch() {
   using Clock = std::chrono::steady_clock;
+  // one that ended a call would look as if the master knew nothing; other threads heed them
+  const pmeta::HeldSignals held_signals;
   Clock::time_point good = Clock::now();
   while (waitFor(kEvery)) {
     const Master master = askMaster();

@@ -8,6 +8,7 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
+#include "pmeta_core/nn/held_signals.h"
 
 namespace pmeta_nodes {
 namespace {
@@ -16,7 +17,10 @@ using XmlRpc::XmlRpcValue;
 
 std::optional<XmlRpcValue> get(const std::string& name) {
   XmlRpcValue value;
-  if (!ros::NodeHandle("~").getParam(name, value)) return std::nullopt;
+  const ros::NodeHandle nh("~");
+  // a signal would end the call to the master, and with it look as if nothing were set
+  const pmeta::HeldSignals held_signals;
+  if (!nh.getParam(name, value)) return std::nullopt;
   return value;
 }
 

@@ -12,6 +12,7 @@
 #include "common/private_param.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/process.h"
+#include "pmeta_core/nn/held_signals.h"
 
 namespace pmeta_nodes {
 namespace {
@@ -75,6 +76,7 @@ pmeta::Experiment readExperiment(const ros::NodeHandle& nh) {
   const std::string file = privateText("config_file", "");
   if (!file.empty()) return pmeta::Experiment::load(file);
   std::string text;
+  const pmeta::HeldSignals held_signals;  // see privateText()
   if (!nh.getParam("config", text)) {
     throw pmeta::Error("the parameter " + nh.resolveName("config") +
                        " is not set: start with roslaunch pmeta_nodes gridworld.launch, or give "

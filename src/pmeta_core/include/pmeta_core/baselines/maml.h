@@ -46,7 +46,7 @@ class Maml : public MetaLearner {
   void setModel(const Model& model) override { model_ = model; }
   IterationStats iterate(std::uint64_t seed, std::uint64_t iteration) override;
   const std::vector<Loss>& losses() const override { return losses_; }
-  std::unique_ptr<Adaptation> adapt(const Model& policy) const override;
+  std::unique_ptr<Adaptation> adapt(const Model& policy, int task) const override;
   void saveState(StateWriter& writer) const override;
   void loadState(StateReader& reader) override;
 
@@ -117,10 +117,9 @@ class MamlKind : public MetaLearnerKind {
   std::unique_ptr<MetaLearner> make(const MetaTasks& tasks) const override {
     return std::make_unique<Method>(tasks, settings_);
   }
-  std::unique_ptr<PolicyFamily> policies(const Env& env) const override {
+  std::unique_ptr<PolicyFamily> policies(const Env& env, int) const override {
     return std::make_unique<GaussianMlpPolicies>(policiesOf(env.spec(), settings_.maml));
   }
-  std::vector<float> unknownTask() const override { return {}; }
 
  private:
   const char* prefix_;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,8 +49,9 @@ class MetaLearner {
   /// Of the last iteration; the first is the method's own measure of success.
   virtual const std::vector<Loss>& losses() const = 0;
 
-  /// How `policy`, which must outlive it, gets to know a task that it is to act on.
-  virtual std::unique_ptr<Adaptation> adapt(const Model& policy) const = 0;
+  /// How `policy`, which must outlive it, gets to know the task that it is to act on. Which that is
+  /// only those go by that are told: `task` is one of training where servesTestTasks() is false.
+  virtual std::unique_ptr<Adaptation> adapt(const Model& policy, int task) const = 0;
 
   /// All but the model that later iterations depend on, between two of them.
   virtual void saveState(StateWriter& writer) const = 0;
@@ -88,11 +90,21 @@ class MetaLearnerKind {
   /// Throws Error where it cannot learn in such environments.
   virtual std::unique_ptr<MetaLearner> make(const MetaTasks& tasks) const = 0;
 
-  /// Its policies for the environment `env`, which must outlive them. Throws as make().
-  virtual std::unique_ptr<PolicyFamily> policies(const Env& env) const = 0;
+  /// Its policies for the environment `env`, which must outlive them; `num_tasks` are trained on.
+  /// Throws as make().
+  virtual std::unique_ptr<PolicyFamily> policies(const Env& env, int num_tasks) const = 0;
 
-  /// What tells a meta-policy that has not explored its task: see PolicyFamily::taskInputSize().
-  virtual std::vector<float> unknownTask() const = 0;
+  /// Can the meta-policy act on tasks that were not trained on?
+  virtual bool servesTestTasks() const { return true; }
+
+  /// What tells a meta-policy that has not explored to act on `task`, see
+  /// PolicyFamily::taskInputSize(); nothing if it must be told one of `num_tasks` and `task` is
+  /// none.
+  virtual std::optional<std::vector<float>> metaInput(int task, int num_tasks) const {
+    static_cast<void>(task);
+    static_cast<void>(num_tasks);
+    return std::vector<float>();
+  }
 };
 
 /// A row of the registry of meta-learners.

@@ -34,7 +34,7 @@ class Pearl : public MetaLearner {
   IterationStats iterate(std::uint64_t seed, std::uint64_t iteration) override;
   /// Means over the iteration's updates.
   const std::vector<Loss>& losses() const override { return losses_; }
-  std::unique_ptr<Adaptation> adapt(const Model& policy) const override;
+  std::unique_ptr<Adaptation> adapt(const Model& policy, int task) const override;
   void saveState(StateWriter& writer) const override;
   void loadState(StateReader& reader) override;
 
@@ -73,9 +73,9 @@ class PearlKind : public MetaLearnerKind {
   }
   int evaluationEpisodes() const override { return settings_.sac.evaluation_episodes; }
   std::unique_ptr<MetaLearner> make(const MetaTasks& tasks) const override;
-  std::unique_ptr<PolicyFamily> policies(const Env& env) const override;
+  std::unique_ptr<PolicyFamily> policies(const Env& env, int num_tasks) const override;
   /// The prior's mean.
-  std::vector<float> unknownTask() const override;
+  std::optional<std::vector<float>> metaInput(int task, int num_tasks) const override;
 
  private:
   PearlSettings settings_;

@@ -29,18 +29,21 @@ class Rl2 : public MetaLearner {
   void setModel(const Model& model) override;
   IterationStats iterate(std::uint64_t seed, std::uint64_t iteration) override;
   const std::vector<Loss>& losses() const override { return losses_; }
-  std::unique_ptr<Adaptation> adapt(const Model& policy) const override;
+  std::unique_ptr<Adaptation> adapt(const Model& policy, int task) const override;
   void saveState(StateWriter& writer) const override;
   void loadState(StateReader& reader) override;
 
  private:
   void makeTargets();
   void scaleRewards();
+  void valueAdvantages();
+  void linearAdvantages();
   void normaliseAdvantages();
   PpoLoss learn(Rng& rng, std::int64_t& updates);
   void move();
 
   Rl2Settings settings_;
+  int num_tasks_;
   Rl2Policies policies_;
   Model model_;
   ProximalAdam adam_;
@@ -55,11 +58,5 @@ class Rl2 : public MetaLearner {
   std::vector<std::size_t> minibatch_;
   AlignedFloats gradient_;
 };
-
-/// Generalised advantages (Schulman et al., 2016) of one path that ends with its last step:
-///
-///     A_t = delta_t + gamma lambda A_{t+1},  delta_t = r_t + gamma V_{t+1} - V_t
-void generalisedAdvantages(const float* rewards, const float* values, std::size_t steps,
-                           double gamma, double lambda, float* advantages);
 
 }  // namespace pmeta

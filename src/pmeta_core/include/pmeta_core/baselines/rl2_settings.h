@@ -15,11 +15,12 @@ struct Rl2Settings {
   std::vector<int> head = {128};              ///< tanh units between it and mean or value
   std::string initialisation = "orthogonal";  ///< of weights: "orthogonal" or "glorot"
   double initial_log_std = 0;
-  int trials = 16;            ///< of one iteration, over all tasks
-  int episodes = 3;           ///< of one trial
-  double gamma = 0.97;        ///< discount, over the whole trial
-  double gae_lambda = 0.9;    ///< of advantages, over the whole trial
-  bool scale_rewards = true;  ///< by the running deviation of the discounted return
+  int trials = 16;                 ///< of one iteration, over all tasks
+  int episodes = 3;                ///< of one trial
+  double gamma = 0.97;             ///< discount, over the whole trial
+  double gae_lambda = 0.9;         ///< of advantages, over the whole trial
+  std::string baseline = "value";  ///< of advantages: "value" (the critic) or "linear"
+  bool scale_rewards = true;       ///< by the running deviation of the discounted return
   double learning_rate = 7e-4;
   int epochs = 2;                  ///< over the trials of one iteration
   int minibatches = 4;             ///< of whole trials, in one epoch

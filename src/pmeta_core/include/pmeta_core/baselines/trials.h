@@ -12,6 +12,7 @@ namespace pmeta {
 
 /// Some episodes of one task, one after the other, as a policy of RL² acted in them by samples.
 struct Trial {
+  int task = 0;
   std::size_t steps = 0;
   // rows by step
   AlignedFloats inputs;                      ///< of the recurrent network
@@ -20,8 +21,8 @@ struct Trial {
   double first_return = 0, last_return = 0;  ///< of those episodes, as policies are judged
 };
 
-/// Plays trials, those of one task side by side. An episode that breaks down ends there; the trial
-/// goes on with the next one.
+/// Plays trials, those of one task side by side and tasks on threads of their own. An episode that
+/// breaks down ends there; the trial goes on with the next one.
 class TrialSampler {
  public:
   /// Episodes of one task running that may break down.
@@ -46,6 +47,7 @@ class TrialSampler {
   class OneTask;
 
   std::vector<std::unique_ptr<OneTask>> tasks_;
+  int threads_;
 };
 
 }  // namespace pmeta

@@ -20,7 +20,7 @@ struct SacSettings {
   double reward_scale = 1;               ///< factor on rewards in the critics' target
   int warm_up_steps = 1000;              ///< uniformly random steps before the first update
   int env_steps_per_update = 1;          ///< environment steps before each update
-  TemperatureSettings temperature;
+  TemperatureSettings temperature;       ///< weight of the entropy
   /// What tells the networks the task besides the observation: "inference" (a latent vector that
   /// the context encoder infers), "one_hot" (the task's number), "none", or, for learners that make
   /// the input themselves, "given".
@@ -34,6 +34,9 @@ struct SacSettings {
   /// copy of a network of its own (as in "Soft Actor-Critic: Off-Policy Maximum Entropy Deep
   /// Reinforcement Learning", 2018), which learns min_k Q_k(s, x, a) - alpha log pi(a).
   std::string backbone = "twin";
+  /// A batch's rows are of so many tasks, in equal parts, whose gradients of critics and actor are
+  /// operated on where they conflict: see operate(). 0: they are not.
+  int surgery_tasks = 0;
   std::string prefix;  ///< of the names of all networks, where there are others beside them
   double min_log_std = GaussianPolicy::kMinLogStd;  ///< see GaussianPolicy
   double head_penalty = 0;                          ///< see GaussianPolicy::addPenalty()

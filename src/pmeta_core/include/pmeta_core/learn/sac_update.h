@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -58,7 +59,7 @@ class SacUpdate {
   /// encoder.
   std::vector<InferredTask>& tasks() { return tasks_; }
 
-  std::size_t batch() const { return batch_; }
+  std::size_t batch() const { return batch_; }  ///< transitions of an update
 
   /// Takes the transition as the row-th of the batch.
   void put(std::size_t row, const Transition& transition);
@@ -75,13 +76,14 @@ class SacUpdate {
   /// pass. Last, the temperature moves. Allocates nothing.
   SacLosses apply(const float* parameters, Optimizer<float>& optimizer, Rng& rng);
 
-  const Temperature& temperature() const { return temperature_; }
+  const Temperature& temperature() const { return temperature_; }  ///< as the last update left it
   /// Critic 1's, then critic 2's, or the value network's.
   const AlignedFloats& targets() const { return targets_; }
   std::int64_t updates() const { return updates_; }  ///< calls of apply() so far
 
   /// Targets, temperature and count.
   void saveState(StateWriter& writer) const;
+  /// Refuses targets of another size, and a temperature that is not finite.
   void loadState(StateReader& reader);
 
  private:
@@ -89,13 +91,22 @@ class SacUpdate {
   void putActions(const float* actions, AlignedFloats& critic_input) const;
   void judgeActions(const float* parameters);
   double updateValue(const float* parameters, Optimizer<float>& optimizer);
-  double updateCritic(int k, const float* parameters, Optimizer<float>& optimizer);
+  double updateCritic(int k, const float* parameters, Optimizer<float>& optimizer, Rng& rng);
   double updateEncoder(const float* parameters, Optimizer<float>& optimizer);
-  double updateActor(const float* parameters, Optimizer<float>& optimizer);
+  double updateActor(const float* parameters, Optimizer<float>& optimizer, Rng& rng);
   void actionGradient(int k, const float* parameters);
+  void operateOn(const Mlp& network, const float* parameters, const float* input,
+                 const float* d_output, Rng& rng);
   InferredTask& taskOf(std::size_t row) { return tasks_[row * tasks_.size() / batch_]; }
   // of critic k, where critics have one
   float* target(int k) { return targets_.data() + (k == 0 ? 0 : networks_.critic(0).size()); }
+
+  // gradient surgery between tasks
+  struct Surgery {
+    std::vector<AlignedFloats> gradients;  // of each task
+    AlignedFloats scratch;
+    std::map<const Mlp*, MlpWorkspace> workspaces;  // for one task's rows
+  };
 
   const SacNetworks& networks_;
   double reward_scale_, tau_, kl_weight_, head_penalty_;
@@ -119,6 +130,7 @@ class SacUpdate {
   AlignedFloats d_action_rows_, d_action_, d_heads_;
   AlignedFloats gradient_;  // of one network at a time
 
+  std::optional<Surgery> surgery_;
   std::vector<InferredTask> tasks_;  // empty without an encoder
   AlignedFloats d_latent_rows_;      // batch x latent
   AlignedFloats encoder_gradient_;   // of one context

@@ -15,9 +15,10 @@ namespace pmeta {
 /// One task's side of the algorithm: trains its personalised policy round by round.
 class TaskAgent : public Party {
  public:
+  /// Throws Error where Experiment::makeLearner() does.
   TaskAgent(const Experiment& experiment, int task);
 
-  int task() const { return task_; }
+  int task() const { return task_; }  ///< a training or test task
   int number() const override { return task_; }
   std::vector<int> tasks() const override { return {task_}; }
   bool trains() const override { return split_ == Split::kTrain; }  ///< a test task only evaluates
@@ -37,6 +38,7 @@ class TaskAgent : public Party {
   /// after the most exploration episodes it is evaluated after.
   ReturnStats evaluateFresh(PolicyKind kind, const Model& policy, int episodes) const;
 
+  /// phi as the last round left it, with the task's presence mask.
   const Model& personal() const { return learner_->personal(); }
   /// What tells the personal policy its task beside the observations; empty if nothing does.
   std::vector<float> taskInput() const { return learner_->taskInput(learner_->personal()); }

@@ -1,0 +1,279 @@
+"""Tests of what sets ours beside methods that learn all tasks at once: figures and margins."""
+
+import csv
+import os
+import statistics
+import sys
+
+import pytest
+
+from run_folders import (Kept, call, curve, edit, fails, groups_of, plot, summary, write_at_once,
+                         write_run)
+import pmeta_archives as pa
+import pmeta_figures as pf
+import pmeta_margins as pm
+import pmeta_method_curves as pmc
+import pmeta_methods as pms
+import pmeta_statistics as ps
+import report
+import results
+
+EXPERIMENT = "half_cheetah_dir"  # of which the paper has a margin
+
+
+def lines_of(axis):
+    return {line.get_label(): line for line in axis.lines if not line.get_label().startswith("_")}
+
+
+def mean_of(folders, *arguments, **named):
+    return [statistics.mean(v) for v in zip(*(curve(f, *arguments, **named) for f in folders))]
+
+
+def total_steps(folders, policy="meta"):
+    return [2 * v for v in mean_of(folders, policy, column="env_steps")]
+
+
+@pytest.fixture
+def mixed(tmp_path):
+    """{algorithm: [folder of seed 0, 1, 2]}, one of them longer than the others."""
+    return {
+        "pmeta": [write_run(tmp_path, seed=s, experiment=EXPERIMENT, learner="sac", rounds=4)
+                  for s in range(3)],
+        "independent": [write_run(tmp_path, "independent", s, experiment=EXPERIMENT, learner="sac")
+                        for s in range(2)],
+        "pearl": [write_at_once(tmp_path, "pearl", 5, 20, EXPERIMENT, seed=s, contexts=(0, 2),
+                                tests=2, scale=2) for s in range(3)],
+        "maml": [write_at_once(tmp_path, "maml", 4, 10, EXPERIMENT, seed=0, contexts=(0, 2, 20),
+                               tests=2)]}
+
+
+def drawn(tmp_path, draw):
+    kept = Kept()
+    draw(groups_of(tmp_path), kept)
+    return kept.written
+
+
+def test_such_runs_alone_have_no_columns_of_personal_policies(tmp_path):
+    folder = write_at_once(tmp_path, contexts=(0, 2), tests=1)
+    out, err = plot(tmp_path, "--format", "png")
+    assert err == "" and "PP" not in out.split("Returns are")[0] and "MP - MA" not in out.split(
+        "Returns are")[0]
+    assert "nan" not in out
+    row = summary(tmp_path / "figures")["GAMMA"]
+    assert float(row["mp_last_mean"]) == pytest.approx(curve(folder, "meta")[-1])
+    assert row["pp_last_mean"] == ""
+    names = os.listdir(str(tmp_path / "figures"))
+    assert {"learning_curves.png", "grid_unseen_tasks.png", "tasks_last.png"} <= set(names)
+    # there is nothing to set it beside
+    assert not [name for name in names if "comparison" in name or "margins" in name]
+    assert "no method that learns all tasks at once" in fails(tmp_path, "--what", "comparison")
+    page = tmp_path / "report.html"
+    call(report.main, tmp_path, "-o", page)
+    assert "GAMMA" in page.read_text(encoding="utf-8")
+
+
+def test_what_an_algorithm_has_no_use_for_tells_it_from_nobody(tmp_path, mixed):
+    [groups] = groups_of(tmp_path).values()
+    assert [group.label for group in groups] == [
+        "pMeta-RL λ=10 C=4", "independent C=4", "MAML C=10", "PEARL C=20"]
+    kept = Kept()
+    pf.learning_curves(EXPERIMENT, groups, kept, "")
+    assert list(lines_of(kept.written[0][0].axes[0])) == [
+        "MP, pMeta-RL λ=10", "PP, pMeta-RL λ=10", "PP, independent", "MP, MAML C=10",
+        "MP, PEARL C=20"]
+
+
+def test_all_of_it_is_drawn_and_told(tmp_path, mixed):
+    out, err = plot(tmp_path, "--format", "png", "--out", tmp_path / "out")
+    assert err == "plot: warning: unseen_tasks shows 2 of the 2 groups.\n" or err == ""
+    assert {"comparison.png", "comparison_unseen.png", "margins.csv"} <= set(
+        os.listdir(str(tmp_path / "out")))
+    assert "margins over other methods" in out and "Margin: (ours - theirs)" in out
+    page = tmp_path / "report.html"
+    call(report.main, tmp_path, "-o", page)
+    text = page.read_text(encoding="utf-8")
+    assert "Margins over other methods" in text and "All methods beside ours" in text
+
+
+def test_methods_are_compared_over_all_steps_after_as_many_episodes(tmp_path, mixed):
+    [(figure, name)] = drawn(tmp_path, pmc.draw_comparison)
+    assert name == "comparison"
+    [axis] = figure.axes
+    assert axis.get_title("left") == EXPERIMENT + ", after 2 episodes"
+    lines = lines_of(axis)
+    assert list(lines) == ["PP, pMeta-RL", "MP, pMeta-RL", "PP, independent", "MAML", "PEARL"]
+    for label, algorithm, arguments in (
+            ("PP, pMeta-RL", "pmeta", ("personal",)), ("MP, pMeta-RL", "pmeta", ("meta",)),
+            ("PP, independent", "independent", ("personal",)),
+            ("MAML", "maml", ("meta", "train", 2)), ("PEARL", "pearl", ("meta", "train", 2))):
+        folders = mixed[algorithm]
+        assert list(lines[label].get_xdata()) == pytest.approx(
+            total_steps(folders, arguments[0])), label
+        expected = mean_of(folders, *arguments)
+        assert list(lines[label].get_ydata()) == pytest.approx(expected), label
+        # the final performance is dotted: of 20 evaluations the mean of two
+        final = statistics.mean(expected[-max(1, len(expected) // 10):])
+        dotted = [line for line in axis.lines if line.get_linestyle() == ":"
+                  and line.get_color() == lines[label].get_color()]
+        assert [line.get_ydata()[0] for line in dotted] == pytest.approx([final]), label
+    looks = [(line.get_color(), line.get_linestyle(), line.get_marker())
+             for line in lines.values()]
+    assert len(set(looks)) == len(looks)
+    assert axis.get_xscale() == "linear" and axis.get_xlim()[1] >= total_steps(mixed["pearl"])[-1]
+
+
+def test_lengths_that_are_unlike_have_a_logarithmic_axis(tmp_path):
+    write_run(tmp_path)
+    write_at_once(tmp_path, rounds=25)
+    [(figure, _)] = drawn(tmp_path, pmc.draw_comparison)
+    assert figure.axes[0].get_xscale() == "log"
+
+
+def test_ours_that_is_told_its_task_stands_beside_ours_that_explores(tmp_path):
+    write_run(tmp_path, learner="dqn")
+    write_run(tmp_path, run_id="explores", contexts=(0, 3, 5))
+    write_at_once(tmp_path, contexts=(0, 5), tests=1)
+    write_at_once(tmp_path, "delta", contexts=(0, 7))
+    [(figure, _)] = drawn(tmp_path, pmc.draw_comparison)
+    # they have no number of episodes in common
+    assert figure.axes[0].get_title("left") == "grid"
+    assert list(lines_of(figure.axes[0])) == [
+        "PP, pMeta-RL, told its task", "MP, pMeta-RL, told its task", "PP, pMeta-RL, explores",
+        "MP, pMeta-RL, explores, after 5 episodes", "DELTA, after 7 episodes",
+        "GAMMA, after 5 episodes"]
+
+
+def test_one_of_several_settings_is_shown_and_the_others_are_named(tmp_path):
+    for value in (1, 10, 50):
+        write_run(tmp_path, lambda_=value)
+    write_at_once(tmp_path)
+    edit(write_run(tmp_path, run_id="elsewhere"), "config.yaml",
+         lambda text: text.replace("sizes: [4, 5]", "sizes: [6, 7]"))
+    _, err = plot(tmp_path, "--what", "comparison", "--format", "png")
+    assert err.startswith("plot: warning: the comparison of grid shows 2 of its 5 groups: "
+                          "pMeta-RL λ=10 ")
+
+
+def test_algorithms_whose_order_is_the_same_look_different(tmp_path):
+    write_run(tmp_path)
+    for name in ("gamma", "delta"):
+        write_at_once(tmp_path, name, order=5)
+    [(figure, _)] = drawn(tmp_path, pmc.draw_comparison)
+    lines = lines_of(figure.axes[0])
+    assert lines["GAMMA"].get_color() != lines["DELTA"].get_color()
+
+
+def test_unseen_tasks_before_and_after_adaptation(tmp_path, mixed):
+    [(figure, name)] = drawn(tmp_path, pmc.draw_unseen_methods)
+    assert name == "comparison_unseen"
+    for axis, count, words in zip(figure.axes, (0, 2), ("before adaptation", "after 2 episodes")):
+        assert axis.get_title("left") == "%s, %s" % (EXPERIMENT, words)
+        lines = lines_of(axis)
+        assert list(lines) == ["MAML", "PEARL"]
+        for label in lines:
+            assert list(lines[label].get_ydata()) == pytest.approx(
+                mean_of(mixed[label.lower()], "meta", "test", count))
+
+
+def margins(tmp_path):
+    [groups] = groups_of(tmp_path).values()
+    return {(row["ours"], row["theirs"], row["when"]): row
+            for row in pm.margin_rows(EXPERIMENT, groups)}
+
+
+def test_margins_follow_from_the_files(tmp_path, mixed):
+    rows = margins(tmp_path)
+    assert [key[:2] for key in list(rows)[::2]] == [
+        (ours, theirs) for ours in ("PP of pMeta-RL", "MP of pMeta-RL")
+        for theirs in ("PP of independent", "MAML", "PEARL")]
+    ours = mean_of(mixed["pmeta"], "personal")[-1]
+    theirs = statistics.mean(mean_of(mixed["pearl"], "meta", "train", 2)[-2:])
+    end = rows["PP of pMeta-RL", "PEARL", pm.END]
+    assert end["percent"] == pytest.approx(100 * (ours - theirs) / abs(theirs))
+    assert end["percent_low"] < end["percent"] < end["percent_high"]
+    assert (end["steps"], end["their_steps"]) == (880, 4400)
+    # at equal steps: where PEARL was at 880 steps of both tasks, which is its round 4
+    equal = rows["PP of pMeta-RL", "PEARL", pm.EQUAL]
+    assert equal["steps"] == equal["their_steps"] == 880
+    curves = mean_of(mixed["pearl"], "meta", "train", 2)
+    between = statistics.mean(curves[3] + (curves[2] - curves[3]) * 0.4 * i / 10 for i in range(11))
+    assert equal["their_return"] == pytest.approx(between)
+    assert end["paper_percent"] == 11.86
+    assert rows["MP of pMeta-RL", "PEARL", pm.END]["paper_percent"] is None
+    # of one seed there is no interval
+    assert rows["PP of pMeta-RL", "MAML", pm.END]["percent_low"] is None
+    plot(tmp_path, "--format", "png", "--what", "curves", "--out", tmp_path / "out")
+    with open(str(tmp_path / "out/margins.csv"), encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    assert len(table) == len(rows)
+    assert float(table[4]["percent"]) == pytest.approx(rows[table[4]["ours"], table[4]["theirs"],
+                                                            pm.EQUAL]["percent"])
+
+
+def row_of(difference=None, limits=(None, None), percent=None, theirs="X", seeds=3):
+    row = dict.fromkeys(pm.COLUMNS)
+    row.update(ours="PP", theirs=theirs, when=pm.EQUAL, seeds=seeds, their_seeds=3, percent=percent,
+               difference=difference, difference_low=limits[0], difference_high=limits[1])
+    return row
+
+
+def test_who_wins_is_said_where_the_interval_leaves_no_doubt():
+    rows = [row_of(5, (1, 9), theirs="A"), row_of(-5, (-9, -1), theirs="B"),
+            row_of(5, (-1, 9), theirs="C"), row_of(5, seeds=1, theirs="D"), row_of(theirs="E")]
+    assert pm.who_wins(rows) == ["PP at equal steps: above A; below B; not told apart from C, "
+                                 "D (one seed); without a common mark with E."]
+
+
+def test_margins_over_what_is_around_zero_are_differences():
+    assert pm.margin_text(row_of(5, (1, 9), percent=12.589)) == "+12.59 %"
+    assert pm.margin_text(row_of(5, (1, 9), percent=1001)) == "+5.00 return [1.00, 9.00]"
+    assert pm.margin_text(row_of(-5)) == "-5.00 return"
+    assert pm.margin_text(row_of()) == "-"
+
+
+def test_percent_are_of_the_size_of_theirs():
+    assert ps.percent_above([110], [100]) == (pytest.approx(10), None)
+    assert ps.percent_above([-50], [-100]) == (pytest.approx(50), None)
+    assert ps.percent_above([5, 6], [-1, 1]) is None
+    value, (low, high) = ps.percent_above([110, 130], [100, 100])
+    assert (value, low, high) == (pytest.approx(20), pytest.approx(10), pytest.approx(30))
+    value, (low, high) = ps.difference([3, 5], [1, 1])
+    assert (value, low, high) == (3, 2, 4)
+
+
+PLAN = """sweeps:
+  - {name: ours, use: test, priority: 1, core_hours: 1, page: page.md, experiment: grid,
+     assignments: "seed:=0-1"}
+  - {name: theirs, use: test, priority: 1, core_hours: 1, page: page.md, experiment: grid,
+     assignments: "seed:=0-1 algorithm:=gamma,delta"}
+figures:
+  - {folder: both, sweeps: [theirs, ours], kinds: [comparison], keep: [comparison]}
+"""
+PAGE = "".join("<!-- generated: %s -->\n<!-- end -->\n" % words for words in (
+    "wins theirs ours", "margins theirs ours", "figure both comparison"))
+
+
+def test_a_page_says_who_wins_or_that_nothing_was_run(tmp_path):
+    folder = tmp_path / "pages"
+    folder.mkdir()
+    (folder / "plan.yaml").write_text(PLAN, encoding="utf-8")
+    page = folder / "page.md"
+    page.write_text(PAGE, encoding="utf-8")
+    call(results.main, "--folder", folder)
+    text = page.read_text(encoding="utf-8")
+    assert "None of these runs can be compared yet." in text
+    assert text.count("Not run yet: theirs") == 2
+    runs = {"ours": [write_run(tmp_path, seed=s) for s in range(2)],
+            "theirs": [write_at_once(tmp_path, name, seed=s, scale=3) for s in range(2)
+                       for name in ("gamma", "delta")]}
+    for name, folders in runs.items():
+        pa.pack(pa.archive_of(str(folder), name), name, ["grid"], folders)
+    call(results.main, "--folder", folder)
+    text = page.read_text(encoding="utf-8")
+    assert "* **grid**: PP of pMeta-RL at equal steps: above DELTA, GAMMA." in text
+    assert "| PP of pMeta-RL | DELTA | 2, 2 | 880 | +" in text
+    assert (folder / "figures/both/comparison.png").is_file()
+
+
+if __name__ == "__main__":
+    sys.exit(pytest.main([__file__]))
