@@ -141,6 +141,34 @@ TEST(Adapt, ActsByTheMeanUnlessNoiseIsWanted) {
   }
 }
 
+TEST(Adapt, ExploresOnThePriorAloneOnDemand) {
+  const Untrained sac;
+  ContextSettings settings = smallSettings().context;
+  std::vector<std::vector<double>> actions(2);
+  for (const bool prior : {false, true}) {
+    settings.exploration_prior = prior;
+    auto env = std::make_unique<Direction>(1);
+    env->log = &actions[prior ? 1 : 0];
+    sac.exploring(std::move(env), settings);
+  }
+  EXPECT_EQ(actions[0][0], actions[1][0]) << "the first episode knows nothing else";
+  EXPECT_NE(actions[0][10], actions[1][10]);
+
+  // starts and z follow from the generator alone
+  Rng rng(0, 0, Stream::kEvaluate);
+  for (std::size_t episode = 0; episode < 3; ++episode) {
+    const auto first = static_cast<float>(rng.normal());
+    const std::vector<float> z = {first, static_cast<float>(rng.normal())};
+    const auto start = static_cast<float>(rng.uniform());
+    GaussianActor actor(sac.networks.actor(), z, 1, GaussianActor::By::kMean,
+                        sac.parameters.data());
+    double action = 0;
+    actor.look(&start, {0});
+    actor.act(0, rng, &action);
+    EXPECT_EQ(actions[1][10 * episode], action);
+  }
+}
+
 TEST(Adapt, CountsTheRewardThatMatters) {
   const Untrained sac;
   auto dense = std::make_unique<Direction>(1), sparse = std::make_unique<Direction>(1);

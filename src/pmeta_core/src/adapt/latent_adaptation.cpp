@@ -21,6 +21,7 @@ LatentAdaptation::LatentAdaptation(const SacNetworks& networks, const ContextSet
     : networks_(networks),
       parameters_(parameters),
       encoder_(requireEncoder(networks)),
+      on_prior_(settings.exploration_prior),
       workspace_(encoder_, static_cast<std::size_t>(settings.batch_size)),
       acting_(networks.actor(), std::vector<float>(encoder_.latentSize()), 1,
               settings.exploration_noise ? GaussianActor::By::kSample : GaussianActor::By::kMean,
@@ -31,7 +32,11 @@ LatentAdaptation::LatentAdaptation(const SacNetworks& networks, const ContextSet
 }
 
 void LatentAdaptation::beginEpisode(Rng& rng) {
-  drawLatent(posterior_, rng, noise_.data(), acting_.taskInput().data());
+  if (!on_prior_) {
+    drawLatent(posterior_, rng, noise_.data(), acting_.taskInput().data());
+    return;
+  }
+  for (float& z : acting_.taskInput()) z = static_cast<float>(rng.normal());
 }
 
 void LatentAdaptation::look(const float* observations, const std::vector<std::size_t>& envs) {

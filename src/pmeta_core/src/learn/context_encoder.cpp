@@ -67,6 +67,8 @@ void bindEncoder(Settings& s, const std::string& prefix, ContextSettings& c) {
          "episodes at test time before z is fixed", Range::between(1, 1000));
   s.bind(prefix + "exploration_noise", c.exploration_noise,
          "these act by samples of the policy instead of its mean");
+  s.bind(prefix + "exploration_prior", c.exploration_prior,
+         "all of these, not only the first, act on z from the prior");
 }
 
 void check(const ContextSettings& context, const std::string& prefix) {

@@ -10,8 +10,9 @@
 namespace pmeta {
 
 /// Adapts as PEARL does at test time: explores with z drawn from the prior in the first episode,
-/// and from the posterior of all transitions before in each later one. What is known is the mean of
-/// q(z|c); before any episode that of the prior, 0.
+/// and from the posterior of all transitions before in each later one, unless with
+/// settings.exploration_prior. What is known is the mean of q(z|c); before any episode that of the
+/// prior, 0.
 ///
 /// Episodes act by tanh(mean), or by samples of the policy with settings.exploration_noise.
 class LatentAdaptation : public Adaptation {
@@ -33,6 +34,7 @@ class LatentAdaptation : public Adaptation {
   const SacNetworks& networks_;
   const float* parameters_;
   const ContextEncoder& encoder_;
+  bool on_prior_;  // in every episode
   ContextEncoder::Workspace workspace_;
   GaussianActor acting_;
   LatentPosterior posterior_;

@@ -39,6 +39,8 @@ struct ContextSettings {
   /// exploration; ascending.
   std::vector<int> exploration_episodes = {2};
   bool exploration_noise = false;  ///< these act by samples instead of tanh(mean)
+  /// All of these act on z from the prior, as in PEARL's release; else only the first does.
+  bool exploration_prior = false;
 };
 
 /// Binds all of them below `prefix`, e.g. "sac.".
