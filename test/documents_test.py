@@ -1,5 +1,6 @@
 """Every command of README.md and docs/: those under a minute are run as they stand, the others with
 --long (then one by one, in the order of the pages). What runs until it is stopped must start."""
+import json
 import os
 import re
 import shlex
@@ -251,3 +252,19 @@ def test_pages_name_settings_that_exist():
         for key in re.findall(r"`(?:[^`\n]* )?([a-zA-Z_.]+):=", prose):
             last = key.rsplit(".", 1)[-1]
             assert last in known or key in ("key",), "%s names %s" % (page, key)
+
+
+@pytest.mark.parametrize("config", ["gridworld", "cart_pole", "sparse_point_robot"])
+def test_each_key_of_a_policy_file_is_told(tmp_path, config):
+    quick = ["preset:=quick"] if config == "cart_pole" else []
+    result = run([LOCAL, "run", TOP / "config" / (config + ".yaml"), "rounds:=1",
+                  "updates_per_round:=1", "run_id:=r", "results_dir:=%s" % tmp_path] + quick)
+    assert result.returncode == 0, result.stderr
+    text = (TOP / "docs/running.md").read_text()
+    told = re.findall(r"^\| (`.*?) \|", text[text.index("## Policy files"):text.index("## Sweeps")],
+                      re.M)
+    told = set(re.findall(r"`(\w+)`", " ".join(told)))
+    for path in tmp_path.glob("*/r/policies/*.safetensors"):
+        data = path.read_bytes()
+        header = json.loads(data[8:8 + int.from_bytes(data[:8], "little")])
+        assert set(header["__metadata__"]) <= told, path

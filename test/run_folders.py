@@ -224,3 +224,21 @@ def edit(folder, name, change):
 def groups_of(top):
     folders, _ = pr.find_folders([str(top)])
     return pg.group_runs(pr.load_runs(folders))
+
+
+def lines_of(axis):
+    """{label: (x, y)} of what the legend names."""
+    return {line.get_label(): (list(line.get_xdata()), list(line.get_ydata()))
+            for line in axis.lines if not line.get_label().startswith("_")}
+
+
+def over_seeds(folders, *arguments, **named):
+    """Mean over seeds of a curve, straight from the files."""
+    return [statistics.mean(v) for v in zip(*(curve(f, *arguments, **named) for f in folders))]
+
+
+def table_row(text, *words):
+    """The one line that holds all the words."""
+    lines = [line for line in text.split("\n") if all(word in line for word in words)]
+    assert len(lines) == 1, lines
+    return lines[0]

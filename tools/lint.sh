@@ -8,7 +8,16 @@ lint_quick() (
   clang-format-14 --dry-run -Werror "${sources[@]}" || failed=1
   shellcheck pmeta .ci/run tools/*.sh tools/commands/*.sh || failed=1
   pyflakes3 src/pmeta_nodes/scripts test tools || failed=1
+  lint_docs || failed=1
   return $failed
+)
+
+# The API reference, in which each public symbol must be documented; it is in build/docs then.
+lint_docs() (
+  cd "$TOP" || exit
+  rm -rf build/docs
+  mkdir -p build/docs
+  doxygen docs/Doxyfile
 )
 
 # Checks of .clang-tidy on the given C++ files.

@@ -81,6 +81,18 @@ def tuned(scripted=False):
     return update, list(online.parameters()) + list(auxiliary.parameters())
 
 
+def linear(x, w, bias, out):
+    return torch.addmm(bias, x, w.t(), out=out)
+
+
+def linear_relu_by_addmm(x, w, bias, out):
+    return linear(x, w, bias, out).relu_()
+
+
+def linear_relu_by_onednn(x, w, bias, _):
+    return torch._C._nn.mkldnn_linear(x.to_mkldnn(), w, bias).to_dense().relu_()
+
+
 def by_hand(onednn=False):
     """No autograd: every product into its own buffer, all parameters in one flat vector."""
     online, target, auxiliary, b = problem()
@@ -103,12 +115,7 @@ def by_hand(onednn=False):
     rewards, discounts, weights = b["rewards"], b["discounts"], b["weights"] * 2 / BATCH
     observations, next_observations, actions = (
         b["observations"], b["next_observations"], b["actions"])
-    linear = lambda x, w, bias, out: torch.addmm(bias, x, w.t(), out=out)
-    if onednn:
-        linear_relu = lambda x, w, bias, out: torch._C._nn.mkldnn_linear(
-            x.to_mkldnn(), w, bias).to_dense().relu_()
-    else:
-        linear_relu = lambda x, w, bias, out: linear(x, w, bias, out).relu_()
+    linear_relu = linear_relu_by_onednn if onednn else linear_relu_by_addmm
     step = 0
 
     def update():

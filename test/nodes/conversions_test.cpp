@@ -325,7 +325,8 @@ TEST(Conversions, TheMacOfAReturnGuardsEachField) {
        [](M& m) { m.split = M::TEST; }, [](M& m) { m.context_episodes = 1; },
        [](M& m) { m.return_mean = 1; }, [](M& m) { m.return_std = 1; },
        [](M& m) { m.episodes = 1; }, [](M& m) { m.env_steps = 1; }, [](M& m) { m.updates = 1; },
-       [](M& m) { m.broken_episodes = 1; }, [](M& m) { m.wall_s = 1; }});
+       [](M& m) { m.broken_episodes = 1; }, [](M& m) { m.losses = {1}, m.loss_names = {"td"}; },
+       [](M& m) { m.wall_s = 1; }});
 }
 
 TEST(Conversions, TheMacOfARoundMessageGuardsEachField) {

@@ -49,6 +49,38 @@ class PolicyNodeTest : public RunOverRos {
     return action_;
   }
 
+  // the same run in this process leaves the same policies
+  void expectThePoliciesOfALocalRun(const std::string& policies) {
+    char folder[] = "/tmp/pmeta_policy_XXXXXX";
+    ASSERT_NE(mkdtemp(folder), nullptr);
+    const pmeta::Experiment local = pmeta::Experiment::parse(
+        experiment_.yaml(), "the run", {"results_dir:=" + std::string(folder)});
+    pmeta::RunLog log(local);
+    pmeta::runLocally(local, &log);
+    for (const std::string file : {"meta", "task_0", "task_1"}) {
+      const std::string name = file + ".safetensors";
+      const pmeta::PolicyFile mine = pmeta::loadPolicy(log.dir() + "/policies/" + name);
+      pmeta::PolicyFile over_ros = pmeta::loadPolicy(policies + name);
+      EXPECT_TRUE(over_ros.model == mine.model) << name;
+      EXPECT_EQ(over_ros.metadata["round"], "10");
+    }
+    std::filesystem::remove_all(folder);
+  }
+
+  void measureLatency() {
+    std::vector<double> microseconds;
+    for (int k = 0; k < 1000; ++k) {
+      const auto sent = std::chrono::steady_clock::now();
+      ASSERT_TRUE(ask({1, 2}, 5).has_value());
+      microseconds.push_back(
+          std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - sent)
+              .count());
+    }
+    std::sort(microseconds.begin(), microseconds.end());
+    std::printf("observation to action: median %.0f us, 99 %% below %.0f us, longest %.0f us\n",
+                microseconds[500], microseconds[990], microseconds[999]);
+  }
+
   void onAction(const Float64MultiArray::ConstPtr& msg) {
     ASSERT_EQ(msg->data.size(), 1u);
     action_ = msg->data[0];
@@ -63,22 +95,8 @@ TEST_F(PolicyNodeTest, ARunsPersonalPolicyAnswersObservationsWithItsGreedyAction
   ASSERT_TRUE(waitFor([&] { return finished(); }));
   const std::string policies = experiment_.runDir() + "/policies/";
 
-  // the same run in this process leaves the same policies
-  char folder[] = "/tmp/pmeta_policy_XXXXXX";
-  ASSERT_NE(mkdtemp(folder), nullptr);
-  const pmeta::Experiment local = pmeta::Experiment::parse(experiment_.yaml(), "the run",
-                                                           {"results_dir:=" + std::string(folder)});
-  pmeta::RunLog log(local);
-  pmeta::runLocally(local, &log);
-  for (const std::string file : {"meta", "task_0", "task_1"}) {
-    const std::string name = file + ".safetensors";
-    const pmeta::PolicyFile mine = pmeta::loadPolicy(log.dir() + "/policies/" + name);
-    pmeta::PolicyFile over_ros = pmeta::loadPolicy(policies + name);
-    EXPECT_TRUE(over_ros.model == mine.model) << name;
-    EXPECT_EQ(over_ros.metadata["round"], "10");
-  }
+  expectThePoliciesOfALocalRun(policies);
   const pmeta::Model model = pmeta::loadPolicy(policies + "task_1.safetensors").model;
-  std::filesystem::remove_all(folder);
 
   const std::string policy = "_policy:=" + policies + "task_1.safetensors";
   const int pid = start({"policy_node", policy.c_str(), "__ns:=/pmeta"});
@@ -100,16 +118,7 @@ TEST_F(PolicyNodeTest, ARunsPersonalPolicyAnswersObservationsWithItsGreedyAction
     EXPECT_FALSE(ask(bad, 0.05).has_value());
   }
 
-  std::vector<double> microseconds;
-  for (int k = 0; k < 1000; ++k) {
-    const auto sent = std::chrono::steady_clock::now();
-    ASSERT_TRUE(ask({1, 2}, 5).has_value());
-    microseconds.push_back(
-        std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - sent).count());
-  }
-  std::sort(microseconds.begin(), microseconds.end());
-  std::printf("observation to action: median %.0f us, 99 %% below %.0f us, longest %.0f us\n",
-              microseconds[500], microseconds[990], microseconds[999]);
+  measureLatency();
 
   std::string health;
   const ros::Subscriber diagnostics = nh_.subscribe<diagnostic_msgs::DiagnosticArray>(

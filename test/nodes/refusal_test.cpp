@@ -60,8 +60,8 @@ TEST_F(Refusal, BadUpdatesAreRefusedWithTheirReasonAndTheRunIsUnharmed) {
   expectRefused(msg, "does not fit its layout");
 
   msg = goodUpdate();
-  pmeta::Model other(pmeta::ModelLayout(pmeta::Precision::kFloat64, {{"q_table", {4, 4}}}));
-  msg.model = toMsg(other);
+  msg.model =
+      toMsg(pmeta::Model(pmeta::ModelLayout(pmeta::Precision::kFloat64, {{"q_table", {4, 4}}})));
   expectRefused(msg, "start it with the same configuration");
 
   msg = goodUpdate();
@@ -105,10 +105,9 @@ TEST_F(Refusal, BadUpdatesAreRefusedWithTheirReasonAndTheRunIsUnharmed) {
 
   // all of them but that of task 77, by the agent they were of
   const std::string reason = "task 0 has weight -1, which is not a positive number.";
-  const std::string counts = "10 accepted, ";
   EXPECT_TRUE(waitFor(
       [&] {
-        return health().compare(0, counts.size(), counts) == 0 &&
+        return health().rfind("10 accepted, ", 0) == 0 &&
                health().find(" 9 refused, 0 left out; last reason: " + reason) != std::string::npos;
       },
       10))

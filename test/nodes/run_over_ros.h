@@ -52,15 +52,21 @@ class RunOverRos : public ::testing::Test {
 
   int roundsDone() const { return summary_ ? static_cast<int>(summary_->round) : 0; }
 
-  /// The run's rounds.csv, final meta-policy and status are those of the local runner, bit for bit.
+  /// The run's tables, final meta-policy and status are those of the local runner, bit for bit.
   void expectEqualsLocal() {
     const pmeta::LocalResult local = pmeta::runLocally(experiment_);
     std::vector<std::string> expected = {pmeta::RunLog::csvHeader()};
+    std::string losses = "round,task,loss,value\n";
     for (const auto& round : local.rounds) {
-      for (const auto& row : round.rows) expected.push_back(pmeta::RunLog::csvLine(row));
+      for (const auto& row : round.rows) {
+        expected.push_back(pmeta::RunLog::csvLine(row));
+        losses += pmeta::RunLog::lossLines(row.result);
+      }
     }
     for (std::string& line : expected) line = withoutWallTime(line);
     EXPECT_EQ(readCsv(), expected);
+    std::ifstream file(experiment_.runDir() + "/losses.csv");
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), losses);
     EXPECT_EQ(pmeta::runStatus(experiment_.runDir()), "finished");
     ASSERT_TRUE(waitFor([&] { return meta_ && meta_->round == meta_->rounds; }, 10));
     EXPECT_TRUE(fromMsg(meta_->model) == local.meta);

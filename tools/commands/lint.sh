@@ -2,10 +2,11 @@
 #
 # usage: ./pmeta lint [--quick | --all]
 #
-# Goes over the code with clang-format, shellcheck and pyflakes, over the ROS packages with
-# catkin_lint, and with clang-tidy over the C++ files that differ from the commit before the last.
+# Goes over the code with clang-format, shellcheck, pyflakes and Doxygen (is each public symbol
+# documented?), over the ROS packages with catkin_lint, and with clang-tidy over the C++ files that
+# differ from the commit before the last.
 #
-#   --quick  the first three alone, which ./pmeta test runs, too
+#   --quick  the first four alone, which ./pmeta test runs, too
 #   --all    clang-tidy over all C++ files: about half an hour on two cores
 #
 # Example: ./pmeta lint

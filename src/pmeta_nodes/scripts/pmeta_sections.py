@@ -116,7 +116,8 @@ def runs_table(groups, folder):
     for group in groups:
         for run in group.runs:
             files = [link(os.path.join(run.folder, name), folder, name)
-                     for name in ("rounds.csv", "final.csv", "config.yaml", "manifest.json")
+                     for name in ("rounds.csv", "losses.csv", "final.csv", "config.yaml",
+                                  "manifest.json")
                      if os.path.isfile(os.path.join(run.folder, name))]
             name = os.path.basename(os.path.normpath(run.folder))
             lines.append([link(run.folder, folder, name), text(group.label), text(run.seed),

@@ -8,53 +8,15 @@
 
 #include "../support.h"
 #include "pmeta_core/base/format.h"
+#include "sample_settings.h"
 
 namespace pmeta {
 namespace {
 
 using test::errorOf;
+using Sample = test::SampleSettings;
 using test::TempDir;
 using test::writeFile;
-
-// one setting of each kind
-struct Sample {
-  std::string title = "demo";
-  int rounds = 10;
-  std::int64_t seed = 0;
-  bool verbose = true;
-  double lambda = 10;
-  std::string init = "meta";
-  double personal_rate = 0.1;
-  double q_rate = 0.2;
-  double gamma = 0.9;
-  int offset = 0;
-  std::vector<int> sizes = {4, 5};
-  std::vector<double> slip = {0};
-  std::vector<std::string> labels = {"a"};
-  std::vector<std::string> corners = {"left"};
-  std::vector<int> any = {0};
-  Settings settings;
-
-  Sample() {
-    settings.bind("title", title, "name of it");
-    settings.bind("rounds", rounds, "C", Range::between(1, 1e6));
-    settings.bind("seed", seed, "seed", Range::atLeast(0));
-    settings.bind("verbose", verbose, "talk");
-    settings.bind("personal.lambda", lambda, "pull", Range::atLeast(0));
-    settings.bind("personal.init", init, "start", {"meta", "keep"});
-    settings.bind("personal.rate", personal_rate, "step", Range::above(0));
-    settings.bind("q_learning.rate", q_rate, "step");
-    settings.bind("q_learning.gamma", gamma, "discount", Range::halfOpen(0, 1));
-    settings.bind("q_learning.offset", offset, "any whole number");
-    settings.bind("environment.sizes", sizes, "cells", Range::between(2, 512));
-    settings.bind("environment.slip", slip, "chance", Range::halfOpen(0, 1));
-    settings.bind("environment.labels", labels, "texts");
-    settings.bind("environment.corners", corners, "words", {"left", "right"});
-    settings.bind("environment.any", any, "whole numbers");
-  }
-
-  void read(const std::string& yaml) { settings.read(parseYaml(yaml, "a.yaml"), "a.yaml"); }
-};
 
 std::string readError(const std::string& yaml) {
   return errorOf([&] { Sample().read(yaml); });
@@ -177,9 +139,14 @@ TEST(Settings, ExtremeIntegersAreRead) {
 TEST(Settings, UnknownChoicesAreRefused) {
   EXPECT_EQ(readError("personal: {init: zero}\n"),
             "personal.init is 'zero' (a.yaml line 1) but must be one of meta, keep.");
+  EXPECT_EQ(readError("personal: {init: mta}\n"),
+            "personal.init is 'mta' (a.yaml line 1) but must be one of meta, keep: did you mean "
+            "'meta'?");
   EXPECT_EQ(readError("environment: {corners: [left, top]}\n"),
-            "environment.corners is '[left, top]' (a.yaml line 1) but must be a list of words out "
-            "of left, right.");
+            "environment.corners holds 'top' (a.yaml line 1) but must be one of left, right.");
+  EXPECT_EQ(readError("environment: {corners: [left, rihgt]}\n"),
+            "environment.corners holds 'rihgt' (a.yaml line 1) but must be one of left, right: did "
+            "you mean 'right'?");
 }
 
 TEST(Settings, EmptyListsAreRefused) {
@@ -355,150 +322,6 @@ TEST(Settings, BindingAKeyTwiceIsAMistakeOfTheProgram) {
   EXPECT_THROW(s.settings.bind("personal.lambda", other, ""), std::logic_error);
 }
 
-TEST(Settings, YamlOfTheDefaultsIsAsExpected) {
-  EXPECT_EQ(Sample().settings.yaml(),
-            "title: demo\nrounds: 10\nseed: 0\nverbose: true\npersonal:\n  lambda: 10\n  init: "
-            "meta\n  rate: 0.1\nq_learning:\n  rate: 0.2\n  gamma: 0.9\n  offset: "
-            "0\nenvironment:\n  sizes: [4, 5]\n  slip: [0]\n  labels: [a]\n  corners: [left]\n  "
-            "any: [0]\n");
-}
-
-void expectTextRoundTrip(const std::string& text) {
-  Sample s;
-  s.title = text;
-  s.labels = {text, "plain", text};
-  Sample back;
-  ASSERT_EQ(errorOf([&] { back.read(s.settings.yaml()); }), "(no error)") << s.settings.yaml();
-  EXPECT_EQ(back.title, s.title) << s.settings.yaml();
-  EXPECT_EQ(back.labels, s.labels) << s.settings.yaml();
-  EXPECT_EQ(back.settings.yaml(), s.settings.yaml());
-}
-
-TEST(Settings, YamlRoundTripsAwkwardTexts) {
-  for (const std::string text :
-       {"",     " ",        "true",  "false", "yes",  "no",   "null",       "Null",
-        "NULL", "~",        "~/x",   "1.5",   "1e5",  "0x10", "nan",        ".inf",
-        "a: b", "a:b",      "a #b",  "#a",    "a, b", "[a]",  "{a}",        "a]",
-        "a}",   "]",        "- a",   "-",     "--",   "---",  "...",        "?",
-        "? a",  ":",        "a:",    "!a",    "&a",   "*a",   "%a",         "@a",
-        "`a",   "|",        ">",     "'",     "\"",   "it's", "say \"hi\"", "back\\slash",
-        "\\n",  "a\nb",     "a\tb",  "\ta",   " a",   "a ",   "Zürich",     "日本",
-        "🙂", "/tmp/a b", "C:\\x", "<<",    "=",    ",",    ",a",         "a,"}) {
-    expectTextRoundTrip(text);
-  }
-}
-
-TEST(Settings, YamlRoundTripsRandomTexts) {
-  std::mt19937 random(1);
-  const std::string alphabet = "ab01 .,:;-#[]{}'\"\\!&*?|>%@`~=<\n\t/_";
-  for (int i = 0; i < 1500 && !HasFailure(); ++i) {
-    std::string text(random() % 6, ' ');
-    for (char& c : text) c = alphabet[random() % alphabet.size()];
-    expectTextRoundTrip(text);
-  }
-}
-
-TEST(Settings, YamlRoundTripsAwkwardNumbers) {
-  const std::vector<double> numbers = {0.1,
-                                       1e-300,
-                                       1e22,
-                                       0,
-                                       1.0 / 3,
-                                       5e-324,
-                                       123456789,
-                                       1e15,
-                                       2.5e-5,
-                                       1e300,
-                                       0.3,
-                                       1e6,
-                                       1e-7,
-                                       std::nextafter(0.1, 1),
-                                       9007199254740993.0};
-  for (const double number : numbers) {
-    Sample s;
-    s.lambda = number;
-    s.q_rate = -number;
-    Sample back;
-    back.read(s.settings.yaml());
-    EXPECT_EQ(back.lambda, s.lambda);
-    EXPECT_EQ(back.q_rate, s.q_rate);
-    EXPECT_EQ(back.settings.yaml(), s.settings.yaml());
-  }
-}
-
-TEST(Settings, YamlRoundTripsIntegersAndFlags) {
-  Sample s;
-  s.seed = std::numeric_limits<std::int64_t>::max();
-  s.offset = std::numeric_limits<int>::min();
-  s.verbose = false;
-  s.sizes = {512, 2, 3};
-  s.slip = {0.1, 0, 0.9999999999999999};
-  Sample back;
-  back.read(s.settings.yaml());
-  EXPECT_EQ(back.seed, s.seed);
-  EXPECT_EQ(back.offset, s.offset);
-  EXPECT_EQ(back.verbose, s.verbose);
-  EXPECT_EQ(back.sizes, s.sizes);
-  EXPECT_EQ(back.slip, s.slip);
-}
-
-TEST(Settings, ASecondDocumentIsRefused) {
-  EXPECT_EQ(
-      errorOf([] { parseYaml("a: 1\n---\nb: 5\n", "y.yaml"); }),
-      "y.yaml line 3 is in a second YAML document, which is not read: remove the '---' before "
-      "it.");
-  EXPECT_EQ(errorOf([] { parseYaml("---\na: 1\n", "y.yaml"); }), "(no error)");
-  EXPECT_EQ(errorOf([] { parseYaml("", "y.yaml"); }),
-            "y.yaml must hold settings as 'key: value' lines.");
-}
-
-TEST(Settings, YamlReadsBackWhereAGroupIsBoundInTwoParts) {
-  double a = 1, b = 2, c = 3;
-  Settings settings;
-  settings.bind("left.a", a, "");
-  settings.bind("right.b", b, "");
-  settings.bind("left.c", c, "");
-  c = 7;
-  const std::string yaml = settings.yaml();
-  c = 0;
-  EXPECT_EQ(errorOf([&] { settings.read(parseYaml(yaml, "y"), "y"); }), "(no error)") << yaml;
-  EXPECT_EQ(c, 7);
-}
-
-TEST(Settings, TableMarksDefaultsAndAlignsValues) {
-  double rate = 0.1;
-  std::string word = "x";
-  Settings settings;
-  settings.bind("group.rate", rate, "the step", Range::above(0));
-  settings.bind("word", word, "a word");
-  word = "y";
-  EXPECT_EQ(settings.table(), "  group.rate  0.1  (default)\n  word        y\n");
-  EXPECT_EQ(settings.table(true),
-            "  group.rate  0.1  (default)\n              the step [a number, above 0]\n"
-            "  word        y  (default: x)\n              a word [text]\n");
-}
-
-TEST(FormatNumber, ReadsBackExactly) {
-  std::mt19937_64 random(2);
-  for (int i = 0; i < 20000; ++i) {
-    const std::uint64_t bits = random();
-    double value = 0;
-    std::memcpy(&value, &bits, sizeof value);
-    if (!std::isfinite(value)) continue;
-    ASSERT_EQ(std::strtod(formatNumber(value).c_str(), nullptr), value);
-  }
-}
-
-TEST(FormatNumber, IsShort) {
-  EXPECT_EQ(formatNumber(0.1), "0.1");
-  EXPECT_EQ(formatNumber(0), "0");
-  EXPECT_EQ(formatNumber(-2.5), "-2.5");
-  EXPECT_EQ(formatNumber(100000), "100000");
-  EXPECT_EQ(formatNumber(1e22), "1e+22");
-  EXPECT_EQ(formatNumber(0.30000000000000004), "0.30000000000000004");
-  EXPECT_EQ(formatNumber(1.0 / 3), "0.3333333333333333");
-}
-
 TEST(Range, TellsWhatItHolds) {
   EXPECT_TRUE(Range::atLeast(0).contains(0));
   EXPECT_FALSE(Range::above(0).contains(0));
@@ -512,47 +335,6 @@ TEST(Range, TellsWhatItHolds) {
   EXPECT_EQ(Range::halfOpen(0, 1).text(), "from 0 to below 1");
   EXPECT_EQ((Range{-HUGE_VAL, 3}.text()), "at most 3");
   EXPECT_EQ((Range{0, 1, true, true}.text()), "above 0 to below 1");
-}
-
-TEST(Nearest, FindsTheClosestWordOrNone) {
-  const std::vector<std::string> words = {"alpha", "lambda", "eta", "personal_init"};
-  EXPECT_EQ(nearest("alfa", words), "alpha");
-  EXPECT_EQ(nearest("lamda", words), "lambda");
-  EXPECT_EQ(nearest("lambda", words), "lambda");
-  EXPECT_EQ(nearest("etta", words), "eta");
-  EXPECT_EQ(nearest("lambad", words), "lambda");
-  EXPECT_EQ(nearest("personalinit", words), "personal_init");
-  EXPECT_EQ(nearest("momentum", words), "");
-  EXPECT_EQ(nearest("alpha", {}), "");
-}
-
-// edit distance by its recursive definition
-std::size_t plainDistance(const std::string& a, const std::string& b) {
-  if (a.empty() || b.empty()) return a.size() + b.size();
-  const std::size_t keep = plainDistance(a.substr(1), b.substr(1)) + (a[0] != b[0]);
-  return std::min({keep, plainDistance(a.substr(1), b) + 1, plainDistance(a, b.substr(1)) + 1});
-}
-
-TEST(Nearest, AgreesWithThePlainEditDistance) {
-  std::mt19937 random(3);
-  const auto word = [&] {
-    std::string text(1 + random() % 5, 'a');
-    for (char& c : text) c = static_cast<char>('a' + random() % 3);
-    return text;
-  };
-  for (int i = 0; i < 300; ++i) {
-    const std::string a = word(), b = word();
-    // short words are close at two edits
-    EXPECT_EQ(nearest(a, {b}), plainDistance(a, b) <= 2 ? b : "") << a << " " << b;
-  }
-}
-
-TEST(Join, PutsSeparatorsBetweenWords) {
-  EXPECT_EQ(join({}), "");
-  EXPECT_EQ(join({"a"}), "a");
-  EXPECT_EQ(join({"a", "b", "c"}), "a, b, c");
-  EXPECT_EQ(join({"a", "b"}, "/"), "a/b");
-  EXPECT_EQ(join({"", "b"}), ", b");
 }
 
 }  // namespace

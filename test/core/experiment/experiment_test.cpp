@@ -15,7 +15,6 @@ namespace {
 
 using test::errorOf;
 using test::gridExperiment;
-using test::ScopedVariable;
 using test::TempDir;
 using test::writeFile;
 
@@ -157,6 +156,9 @@ TEST(Experiment, ValuesOutOfRangeAreRefused) {
   EXPECT_EQ(refused({"algorithm:=maml"}),
             "algorithm is 'maml' (given as algorithm:=maml) but must be one of "
             "independent, model_averaging, pmeta, pooled.");
+  EXPECT_EQ(refused({"algorithm:=pmtea"}),
+            "algorithm is 'pmtea' (given as algorithm:=pmtea) but must be one of independent, "
+            "model_averaging, pmeta, pooled: did you mean 'pmeta'?");
   EXPECT_EQ(refused({"quorum:=6"}),
             "aggregation.quorum is 6 but there are 5 tasks: give at most that, or 0 for all.");
 }
@@ -194,6 +196,9 @@ TEST(Experiment, RobustAggregationIsSettings) {
   EXPECT_EQ(refused({"rule:=mode"}),
             "aggregation.rule is 'mode' (given as rule:=mode) but must be one of mean, median, "
             "trimmed_mean.");
+  EXPECT_EQ(refused({"rule:=meidan"}),
+            "aggregation.rule is 'meidan' (given as rule:=meidan) but must be one of mean, median, "
+            "trimmed_mean: did you mean 'median'?");
 }
 
 TEST(Experiment, TheKeyFileIsKeptAsAnAbsolutePath) {
@@ -228,14 +233,14 @@ TEST(Experiment, UnknownEnvironmentsAreRefusedWhereverTheyAreNamed) {
 TEST(Experiment, OverridingAnUnknownEnvironmentDoesNotHideIt) {
   EXPECT_EQ(refused({"name:=gridwrld", "environment.name:=\"gridworld\""}),
             "environment.name is 'gridwrld' (given as name:=gridwrld) but must be one of " +
-                join(envFamilies().names()) + ".");
+                join(envFamilies().names()) + ": did you mean 'gridworld'?");
   EXPECT_EQ(gridExperiment({"environment.name:=gridworld"}).settings().environment, "gridworld");
   EXPECT_EQ(errorOf([] {
               Experiment::parse("environment: {name: gridwrld}", "a.yaml",
                                 {"environment.name:=gridworld"});
             }),
             "environment.name is 'gridwrld' (a.yaml line 1) but must be one of " +
-                join(envFamilies().names()) + ".");
+                join(envFamilies().names()) + ": did you mean 'gridworld'?");
 }
 
 TEST(Experiment, OddEnvironmentSectionsAreRefused) {
@@ -353,154 +358,6 @@ TEST(Experiment, AnotherLearnerIsNoDefault) {
   EXPECT_NE(text.find("cart_pole  (default: gridworld)\n"), std::string::npos) << text;
   EXPECT_NE(text.find("  dqn.batch_size "), std::string::npos) << text;
   EXPECT_EQ(text.find("q_learning.updates"), std::string::npos) << text;
-}
-
-TEST(ResultsDir, DefaultsToRosHomeThenHome) {
-  const ScopedVariable home("HOME", "/home/me");
-  {
-    const ScopedVariable ros_home("ROS_HOME", "/var/ros");
-    EXPECT_EQ(expandResultsDir(""), "/var/ros/pmeta");
-  }
-  const ScopedVariable ros_home("ROS_HOME", nullptr);
-  EXPECT_EQ(expandResultsDir(""), "/home/me/.ros/pmeta");
-}
-
-TEST(ResultsDir, ExpandsTheHomeFolderAndMakesPathsAbsolute) {
-  const ScopedVariable home("HOME", "/home/me");
-  EXPECT_EQ(expandResultsDir("~"), "/home/me");
-  EXPECT_EQ(expandResultsDir("~/runs"), "/home/me/runs");
-  EXPECT_EQ(expandResultsDir("/tmp/x/../y"), "/tmp/y");
-  EXPECT_EQ(expandResultsDir("runs"), (std::filesystem::current_path() / "runs").string());
-  EXPECT_EQ(gridExperiment({"results_dir:=~/runs"}).runDir(), "/home/me/runs/grid/run");
-  EXPECT_EQ(gridExperiment({"results_dir:=~"}).runDir(), "/home/me/grid/run");
-  const ScopedVariable ros_home("ROS_HOME", "ros");
-  EXPECT_EQ(expandResultsDir(""), (std::filesystem::current_path() / "ros/pmeta").string());
-}
-
-TEST(ResultsDir, WithoutAHomeItMustBeGiven) {
-  const ScopedVariable home("HOME", nullptr), ros_home("ROS_HOME", nullptr);
-  const std::string sentence =
-      "results_dir is not given and HOME is not set: give results_dir:=DIR.";
-  EXPECT_EQ(errorOf([] { expandResultsDir(""); }), sentence);
-  EXPECT_NE(errorOf([] { expandResultsDir("~/runs"); }), "(no error)") << "not /runs";
-  EXPECT_EQ(expandResultsDir("/tmp/x"), "/tmp/x");
-}
-
-constexpr char kWithPresets[] =
-    "rounds: 7\n"
-    "personal: {lambda: 3}\n"
-    "presets:\n"
-    "  paper: {personal: {lambda: 2}, rounds: 5}\n"
-    "  deep: {learner: dqn, environment: {name: cart_pole}, dqn: {hidden: [8]}}\n";
-
-TEST(Presets, AreReadOverTheRestAndUnderOverrides) {
-  const auto load = [](const std::vector<std::string>& overrides) {
-    return Experiment::parse(kWithPresets, "file.yaml", overrides).settings();
-  };
-  EXPECT_EQ(load({}).rounds, 7);
-  EXPECT_EQ(load({}).personal.lambda, 3);
-  EXPECT_EQ(load({"preset:=paper"}).rounds, 5);
-  EXPECT_EQ(load({"preset:=paper"}).personal.lambda, 2);
-  EXPECT_EQ(load({"preset:=paper", "lambda:=4"}).personal.lambda, 4);
-  EXPECT_EQ(load({"preset:=deep"}).learner, "dqn");
-  EXPECT_EQ(load({"preset:=deep"}).environment, "cart_pole");
-}
-
-TEST(Presets, EffectiveSettingsAreReadAgainWithoutTheFile) {
-  const auto first = Experiment::parse(kWithPresets, "file.yaml", {"preset:=deep", "run_id:=r"});
-  const auto second = Experiment::parse(first.yaml(), "config.yaml");
-  EXPECT_EQ(second.yaml(), first.yaml());
-  EXPECT_EQ(second.settings().preset, "deep");
-}
-
-TEST(Presets, UnknownOnesAreRefusedWithTheKnown) {
-  EXPECT_EQ(errorOf([] { Experiment::parse(kWithPresets, "file.yaml", {"preset:=papre"}); }),
-            "unknown preset 'papre': file.yaml has paper, deep.");
-  EXPECT_EQ(errorOf([] { Experiment::parse("rounds: 1", "file.yaml", {"preset:=paper"}); }),
-            "unknown preset 'paper': file.yaml has none.");
-}
-
-TEST(Presets, ErrorsInThemKeepTheirLine) {
-  const std::string text = "rounds: 7\npresets:\n  bad:\n    personal:\n      lamda: 2\n";
-  EXPECT_EQ(errorOf([&] { Experiment::parse(text, "file.yaml", {"preset:=bad"}); }),
-            "unknown setting 'personal.lamda' (file.yaml line 5): did you mean 'personal.lambda'?");
-}
-
-TEST(Learner, MustFitTheEnvironment) {
-  const auto tabular = Experiment::parse("environment: {name: cart_pole}", "test");
-  EXPECT_EQ(errorOf([&] { tabular.makeLearner(0); }),
-            "environment 'cart_pole' is not tabular, so q_learning cannot learn it: choose "
-            "another learner.");
-}
-
-TEST(Learner, SettingsOfOthersAreUnknown) {
-  EXPECT_NE(errorOf([] { Experiment::parse("dqn: {n_step: 1}", "test"); }).find("unknown setting"),
-            std::string::npos);
-  EXPECT_NE(errorOf([] {
-              Experiment::parse("learner: dqn\nq_learning: {gamma: 0}", "test");
-            }).find("unknown setting"),
-            std::string::npos);
-}
-
-TEST(Learner, UnknownOnesAreToldTheKnownOnes) {
-  EXPECT_EQ(
-      errorOf([] { Experiment::parse("learner: sca", "test"); }),
-      "unknown learner 'sca': did you mean 'sac'? Known are " + join(learners().names()) + ".");
-}
-
-TEST(Learner, ANetworkMayHaveALambdaOfItsOwn) {
-  const auto load = [](const std::string& own) {
-    return Experiment::parse(
-        "learner: sac\nenvironment: {name: sparse_point_robot}\n"
-        "personal: {lambda_critic: " +
-            own + "}",
-        "test");
-  };
-  EXPECT_FALSE(load("-1").settings().personal.lambdas.critic.has_value());
-  EXPECT_EQ(load("0").settings().personal.lambdas.critic, 0);
-  EXPECT_NE(load("-1").yaml().find("lambda_critic: -1\n"), std::string::npos);
-  EXPECT_NE(errorOf([&] { load("-0.5"); }).find("a number, at least 0, or -1"), std::string::npos);
-}
-
-TEST(Stability, OfNetworksOnlyThePullCounts) {
-  const auto load = [](const std::vector<std::string>& overrides) {
-    return Experiment::parse(
-        "learner: dqn\nenvironment: {name: cart_pole}\n"
-        "personal: {alpha: 0.001, lambda: 20, eta: 0.01}",
-        "test", overrides);
-  };
-  EXPECT_TRUE(load({}).notes().empty());
-  EXPECT_EQ(errorOf([&] { load({"alpha:=0.1"}); }),
-            "personal.alpha = 0.1 with personal.lambda = 20 diverges: alpha must be below "
-            "2 / lambda = 0.1.");
-  EXPECT_EQ(load({"alpha:=0.06"}).notes().size(), 1u);
-}
-
-TEST(RequireWritable, CreatesTheFolderAndLeavesNothingInIt) {
-  const TempDir dir;
-  requireWritable(dir / "a/b");
-  EXPECT_TRUE(std::filesystem::is_directory(dir / "a/b"));
-  EXPECT_TRUE(std::filesystem::is_empty(dir / "a/b"));
-}
-
-TEST(RequireWritable, SaysWhyAFolderCannotBeWritten) {
-  const TempDir dir;
-  writeFile(dir / "file", "x");
-  EXPECT_EQ(errorOf([&] { requireWritable(dir / "file/below"); }),
-            "the results folder " + (dir / "file/below") +
-                " cannot be written (Not a directory): choose another with results_dir:=DIR.");
-  EXPECT_EQ(errorOf([&] { requireWritable(dir / "file"); }),
-            "the results folder " + (dir / "file") +
-                " cannot be written (Not a directory): choose another with results_dir:=DIR.");
-}
-
-TEST(UtcTime, HasItsTwoForms) {
-  const auto shape = [](std::string text) {
-    for (char& c : text) c = c >= '0' && c <= '9' ? '0' : c;
-    return text;
-  };
-  EXPECT_EQ(shape(utcStamp()), "00000000T000000");
-  EXPECT_EQ(shape(utcTime()), "0000-00-00T00:00:00Z");
 }
 
 }  // namespace

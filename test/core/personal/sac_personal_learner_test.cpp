@@ -12,106 +12,20 @@
 #include "../allocations.h"
 #include "../memory_state.h"
 #include "../support.h"
-#include "pmeta_core/adapt/latent_adaptation.h"
+#include "goal_learners.h"
 #include "pmeta_core/aggregate/mix.h"
-#include "pmeta_core/personal/personal_learner.h"
 
 namespace pmeta {
 namespace {
 
-// a point on a line with a goal of its own
-class Goal : public Env {
- public:
-  explicit Goal(double goal) : goal_(goal) {
-    spec_.name = "goal";
-    spec_.observation_size = 2;
-    spec_.action_size = 1;
-    spec_.horizon = 10;
-  }
-  const EnvSpec& spec() const override { return spec_; }
-  void reset(Rng& rng, double* observation) override {
-    x_ = 2 * rng.uniform() - 1;
-    t_ = 0;
-    observe(observation);
-  }
-  Step step(const double* action, Rng&, double* observation) override {
-    x_ += 0.3 * action[0];
-    ++t_;
-    observe(observation);
-    return {-std::abs(x_ - goal_), false, t_ == spec_.horizon};
-  }
-
- private:
-  void observe(double* observation) const {
-    observation[0] = x_;
-    observation[1] = 0.1 * t_;
-  }
-  EnvSpec spec_;
-  double goal_;
-  double x_ = 0;
-  int t_ = 0;
-};
-
-constexpr int kTasks = 3;
-
-SacSettings smallSettings(const std::string& task_encoding = "one_hot") {
-  SacSettings settings;
-  settings.hidden = {8, 6};
-  settings.batch_size = 16;
-  settings.buffer_size = 200;
-  settings.warm_up_steps = 30;
-  settings.task_encoding = task_encoding;
-  settings.context.hidden = {7, 5};
-  settings.context.latent_size = 2;
-  settings.context.batch_size = 10;
-  settings.context.buffer_size = 50;
-  settings.evaluation_episodes = 4;
-  return settings;
-}
-
-PersonalSettings pulled() {
-  PersonalSettings settings;
-  settings.learning_rate = settings.alpha = 1e-3;
-  settings.lambda = 15;
-  settings.eta = 1e-2;
-  return settings;
-}
-
-ProximalAdamSettings adamOf(const PersonalSettings& personal) {
-  ProximalAdamSettings settings;
-  settings.learning_rate = personal.learning_rate;
-  settings.alpha = personal.alpha;
-  settings.lambda = personal.lambda;
-  settings.eta = personal.eta;
-  return settings;
-}
-
-PersonalLearner makeLearner(const SacSettings& settings = smallSettings(), int task = 1,
-                            const PersonalSettings& personal = pulled()) {
-  const auto make_env = [task](int) { return std::make_unique<Goal>(task - 1); };
-  auto learner = std::make_unique<SacLearner>(
-      make_env(0), settings,
-      settings.task_encoding == "one_hot" ? oneHot(task, kTasks) : std::vector<float>());
-  PersonalParts parts;
-  if (learner->networks().hasEncoder()) {
-    parts.exploration_episodes = settings.context.exploration_episodes;
-    parts.adapt = [&networks = learner->networks(), context = settings.context](const Model& m) {
-      return std::make_unique<LatentAdaptation>(networks, context, m.floats().data());
-    };
-  }
-  parts.learner = std::move(learner);
-  parts.evaluation_envs = makeEnvs(make_env, settings.evaluation_episodes);
-  parts.reset_moments = settings.reset_moments;
-  return PersonalLearner(std::move(parts), personal);
-}
-
-const SacLearner& sac(const PersonalLearner& learner) {
-  return dynamic_cast<const SacLearner&>(learner.learner());
-}
-
-void run(PersonalLearner& learner, int updates, Rng& rng) {
-  for (int r = 0; r < updates; ++r) learner.update(rng);
-}
+using test::adamOf;
+using test::Goal;
+using test::kTasks;
+using test::makeLearner;
+using test::pulled;
+using test::run;
+using test::sac;
+using test::smallSettings;
 
 TEST(SacPersonalLearner, LayoutNamesEveryNetwork) {
   EXPECT_EQ(makeLearner().layout().text(),
@@ -307,83 +221,6 @@ TEST(SacPersonalLearner, OneSeedOneResultWhateverIsEvaluated) {
     EXPECT_EQ(a.auxiliary().checksum(), b.auxiliary().checksum());
     EXPECT_NE(a.personal().checksum(), other.personal().checksum());
   }
-}
-
-TEST(SacPersonalLearner, EvaluatesWithTheMeanOfItsOwnContext) {
-  auto learner = makeLearner(smallSettings("inference"));
-  learner.beginRound(learner.initialModel(1), false);
-  Rng rng(1, 0, Stream::kSample);
-  run(learner, 20, rng);
-  Rng starts(2, 0, Stream::kEvaluate);
-  const Episode episode = learner.record(learner.personal(), starts);
-  const float* parameters = learner.personal().floats().data();
-  const SacNetworks& networks = sac(learner).networks();
-  const LatentPosterior posterior =
-      sac(learner).context().posterior(parameters + networks.encoderOffset());
-  const std::vector<float> z(posterior.mean.begin(), posterior.mean.end());
-  EXPECT_EQ(learner.taskInput(learner.personal()), z);
-  GaussianActor actor(networks.actor(), z, 1, GaussianActor::By::kMean, parameters);
-  ASSERT_EQ(episode.actions.size(), 10u);
-  for (std::size_t t = 0; t < episode.actions.size(); ++t) {
-    const std::vector<float> seen(&episode.observations[2 * t], &episode.observations[2 * t] + 2);
-    double action = 0;
-    actor.look(seen.data(), {0});
-    actor.act(0, rng, &action);
-    EXPECT_EQ(episode.actions[t], action);
-  }
-}
-
-TEST(SacPersonalLearner, AdaptedReturnsCompareLikeWithLike) {
-  auto learner = makeLearner(smallSettings("inference"));
-  Model policy = learner.initialModel(1);
-  Rng rng(3, 0, Stream::kEvaluate), same = rng;
-  const std::vector<AdaptedReturn> returns = learner.evaluateAdapted(policy, rng);
-  ASSERT_EQ(returns.size(), 2u);
-  EXPECT_EQ(returns[0].context_episodes, 0);
-  EXPECT_EQ(returns[1].context_episodes, 2);
-  EXPECT_EQ(returns[0].stats.episodes, 4);
-  EXPECT_NE(returns[0].stats.mean, returns[1].stats.mean);
-  // nothing was collected, so evaluate() has the prior's mean for z
-  EXPECT_EQ(learner.evaluate(policy, same).mean, returns[0].stats.mean);
-  // an actor blind to z gains nothing: the starts are the same
-  const Mlp& actor = sac(learner).networks().actor();
-  for (std::size_t o = 0; o < 8; ++o) {
-    for (std::size_t i = 2; i < 4; ++i) policy.floats()[o * actor.inputs() + i] = 0;
-  }
-  const std::vector<AdaptedReturn> blind = learner.evaluateAdapted(policy, rng);
-  EXPECT_EQ(blind[0].stats.mean, blind[1].stats.mean);
-}
-
-TEST(SacPersonalLearner, MetaPoliciesAreJudgedAfterEachNumberOfEpisodesAskedFor) {
-  SacSettings settings = smallSettings("inference");
-  settings.context.exploration_episodes = {1, 3};
-  const auto learner = makeLearner(settings);
-  Rng rng(3, 0, Stream::kEvaluate), same = rng;
-  const Model policy = learner.initialModel(1);
-  const std::vector<AdaptedReturn> returns = learner.evaluateAdapted(policy, rng);
-  ASSERT_EQ(returns.size(), 3u);
-  EXPECT_EQ(returns[0].context_episodes, 0);
-  EXPECT_EQ(returns[1].context_episodes, 1);
-  EXPECT_EQ(returns[2].context_episodes, 3);
-  EXPECT_EQ(returns[0].task_input, std::vector<float>(2));
-  EXPECT_NE(returns[1].task_input, returns[2].task_input);
-  const Episode episode = learner.recordAdapted(policy, returns[2], same);
-  const std::unique_ptr<Actor> actor =
-      learner.learner().policies().actor(policy, returns[2].task_input, 1);
-  const std::vector<float> start(episode.observations.begin(), episode.observations.begin() + 2);
-  double action = 0;
-  actor->look(start.data(), {0});
-  actor->act(0, same, &action);
-  EXPECT_EQ(episode.actions[0], action);
-}
-
-TEST(SacPersonalLearner, WithoutAnEncoderThereIsNothingToAdapt) {
-  const auto learner = makeLearner();
-  Rng rng(3, 0, Stream::kEvaluate), same = rng;
-  const std::vector<AdaptedReturn> returns = learner.evaluateAdapted(learner.initialModel(1), rng);
-  ASSERT_EQ(returns.size(), 1u);
-  EXPECT_EQ(returns[0].context_episodes, 0);
-  EXPECT_EQ(returns[0].stats.mean, learner.evaluate(learner.initialModel(1), same).mean);
 }
 
 TEST(SacPersonalLearner, NetworksWithLambdaZeroAreEachRobotsOwn) {

@@ -42,6 +42,25 @@ std::vector<Expected> transitionsOf(const RawEpisode& e, int n, double gamma, bo
   return out;
 }
 
+// a step from where the episode is to `to`, added there, too
+Step addStep(NStepAccumulator& n_step, int env, float to, RawEpisode& e, Rng& rng,
+             PrioritisedReplay& replay) {
+  Step step;
+  step.reward = rng.normal();
+  const std::uint64_t end = rng.below(16);  // short episodes, some of one step
+  step.terminated = end == 0 || end == 2;
+  step.truncated = end == 1 || end == 2;
+  const float action = static_cast<float>(rng.below(5));
+  const float from = e.states.back();
+  n_step.add(env, &from, &action, step, &to, replay);
+  e.states.push_back(to);
+  e.actions.push_back(action);
+  e.rewards.push_back(step.reward);
+  e.terminated = step.terminated;
+  e.truncated = step.truncated;
+  return step;
+}
+
 class NStep : public ::testing::TestWithParam<bool> {};
 
 TEST_P(NStep, EqualsTheDefinitionOnRawEpisodes) {
@@ -58,20 +77,8 @@ TEST_P(NStep, EqualsTheDefinitionOnRawEpisodes) {
     for (int t = 0; t < 2000; ++t) {
       for (int i = 0; i < num_envs; ++i) {
         RawEpisode& e = raw[i].back();
-        Step step;
-        step.reward = rng.normal();
-        const std::uint64_t end = rng.below(16);  // short episodes, some of one step
-        step.terminated = end == 0 || end == 2;
-        step.truncated = end == 1 || end == 2;
-        const float action = static_cast<float>(rng.below(5));
-        const float from = e.states.back(), to = state++;
         const std::size_t before = replay.size();
-        n_step.add(i, &from, &action, step, &to, replay);
-        e.states.push_back(to);
-        e.actions.push_back(action);
-        e.rewards.push_back(step.reward);
-        e.terminated = step.terminated;
-        e.truncated = step.truncated;
+        const Step step = addStep(n_step, i, state++, e, rng, replay);
         if (step.terminated || step.truncated) {
           EXPECT_EQ(n_step.queues()[i].size, 0);
           raw[i].push_back({{state++}, {}, {}});

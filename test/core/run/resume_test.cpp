@@ -24,13 +24,13 @@ using test::writeFile;
 
 // a run's files without the wall times
 struct Record {
-  std::string rounds, fresh;
+  std::string rounds, losses, fresh;
   std::uint32_t meta = 0;
   std::vector<std::uint32_t> personal;
 
   bool operator==(const Record& other) const {
-    return rounds == other.rounds && fresh == other.fresh && meta == other.meta &&
-           personal == other.personal;
+    return rounds == other.rounds && losses == other.losses && fresh == other.fresh &&
+           meta == other.meta && personal == other.personal;
   }
 };
 
@@ -38,6 +38,7 @@ Record recordOf(const Experiment& experiment) {
   const std::string dir = experiment.runDir();
   Record record;
   record.rounds = std::regex_replace(readFile(dir + "/rounds.csv"), std::regex(",[^,\n]*\n"), "\n");
+  record.losses = readFile(dir + "/losses.csv");
   if (fs::exists(dir + "/final.csv")) record.fresh = readFile(dir + "/final.csv");
   record.meta = loadPolicy(dir + "/policies/meta.safetensors").model.checksum();
   for (int task = 0; task < experiment.numTasks(); ++task) {
@@ -155,11 +156,19 @@ TEST(Resume, CutsTheRecordBackToWhatTheCheckpointKnows) {
   runUntilCrash(experiment, 3);
   const std::string csv = experiment.runDir() + "/rounds.csv";
   writeFile(csv, readFile(csv) + "4,0,train,personal,0,-1,0,9,10,3,0.1\n4,1,tra");
+  const std::string losses = experiment.runDir() + "/losses.csv";
+  writeFile(losses, readFile(losses) + "4,0,td,1\n4,1,t");
   resume(experiment);
   EXPECT_TRUE(recordOf(experiment) == recordOf(whole));
 
   const Experiment lost = checkpointExperiment("table", dir / "lost");
   runUntilCrash(lost, 4);
+  const std::string altered = lost.runDir() + "/losses.csv";
+  const std::string good = readFile(altered);
+  writeFile(altered, "round,task,loss,value\nx,0,td,1\n");
+  EXPECT_EQ(errorOf([&] { RunLog::reopen(lost, 3); }),
+            altered + " line 2 is 'x,0,td,1', which no run writes: it has been altered.");
+  writeFile(altered, good);
   const std::string path = lost.runDir() + "/rounds.csv";
   writeFile(path, std::string(RunLog::csvHeader()) + "\n");
   EXPECT_EQ(errorOf([&] { RunLog::reopen(lost, 3); }),

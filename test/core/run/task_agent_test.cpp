@@ -363,8 +363,12 @@ TEST(TaskAgent, TellsAllLossesOfItsLastUpdate) {
   const auto result = agent.trainRound(meta);
   ASSERT_TRUE(result);
   ASSERT_EQ(result->losses.size(), 1u);
-  EXPECT_EQ(result->losses.front().name, std::string("td"));
+  EXPECT_EQ(result->losses.front().name, "td");
   EXPECT_EQ(result->losses.front().value, result->loss);
+  ASSERT_TRUE(result->personal);
+  ASSERT_EQ(result->personal->losses.size(), 1u);
+  EXPECT_EQ(result->personal->losses.front().name, "td");
+  EXPECT_EQ(result->personal->losses.front().value, result->loss);
 }
 
 }  // namespace

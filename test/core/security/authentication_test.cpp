@@ -47,6 +47,7 @@ TaskReturn taskReturn() {
   result.episodes = 15;
   result.env_steps = 1LL << 40;
   result.updates = 30;
+  result.losses = {{"td", 0.5}};
   result.seconds = 0.125;
   return result;
 }
@@ -126,7 +127,9 @@ TEST(Authentication, EachFieldOfAReturnCounts) {
        [](M& m) { m.scheduled = false; }, [](M& m) { m.context_episodes = 1; },
        [](M& m) { m.mean = 1.5; }, [](M& m) { m.std = 0; }, [](M& m) { m.episodes = 16; },
        [](M& m) { m.env_steps = 1; }, [](M& m) { m.updates = 31; },
-       [](M& m) { m.broken_episodes = 1; }, [](M& m) { m.seconds = 0.25; }});
+       [](M& m) { m.broken_episodes = 1; }, [](M& m) { m.seconds = 0.25; },
+       [](M& m) { m.losses.clear(); }, [](M& m) { m.losses[0].name = "kl"; },
+       [](M& m) { m.losses[0].value = 1; }});
   EXPECT_NE(authenticator().mac(taskReturn(), "a"), authenticator().mac(taskReturn(), "b"));
 }
 

@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "../support.h"
+#include "pmeta_core/run/meta_aggregator.h"
+#include "pmeta_core/run/task_agent.h"
 
 namespace pmeta::test {
 
@@ -50,6 +52,17 @@ inline Experiment checkpointExperiment(const std::string& kind, const std::strin
                                        std::vector<std::string> overrides = {}) {
   overrides.push_back("results_dir:=" + results_dir);
   return Experiment::parse(checkpointYaml(kind), kind + ".yaml", overrides);
+}
+
+/// An agent that has trained some rounds.
+inline TaskAgent trainedAgent(const Experiment& experiment, int rounds, int task = 1) {
+  TaskAgent agent(experiment, task);
+  MetaPolicy meta = MetaAggregator(experiment).metaPolicy();
+  for (; meta.round < rounds; ++meta.round) {
+    agent.evaluateMeta(meta);
+    agent.trainRound(meta);
+  }
+  return agent;
 }
 
 }  // namespace pmeta::test

@@ -250,8 +250,8 @@ TEST(ConvergenceSettings, MistakesAreNamed) {
   EXPECT_EQ(errorOf("meta:\n  lambdas: [0, 5]"),
             "meta.lambdas is '[0, 5]' (test.yaml line 2) but must be a list of numbers, above 0.");
   EXPECT_EQ(errorOf("diversities: [corner, middle]"),
-            "diversities is '[corner, middle]' (test.yaml line 1) but must be a list of words out "
-            "of corner, centre, random, random_slip.");
+            "diversities holds 'middle' (test.yaml line 1) but must be one of corner, centre, "
+            "random, random_slip.");
   EXPECT_EQ(errorOf("diversities: [corner, corner]"),
             "diversities names 'corner' twice: keep one of them.");
   EXPECT_EQ(errorOf("environment:\n  slip: [0, 0.1]"),

@@ -112,7 +112,7 @@ TEST(ModelCheck, OtherFilesAreRefused) {
             " line 1 names no column 'value': is this the right kind of file?");
   EXPECT_EQ(refused([](Lines& l) { l.resize(1); }), " holds no figures, only a header.");
   EXPECT_EQ(errorOf([] { checkModel("dog_model", pathOf("ant_model")); }),
-            "unknown model 'dog_model': known are ant_model, half_cheetah_model, walker2d_model.");
+            "unknown model 'dog_model'. Known are ant_model, half_cheetah_model, walker2d_model.");
   // another model's figures
   EXPECT_NE(errorOf([] { checkModel("half_cheetah_model", pathOf("ant_model")); }), "(no error)");
   EXPECT_FALSE(checkModel("ant_model", pathOf("walker2d_model")).ok());

@@ -12,24 +12,8 @@ std::string meanings(const Registry<LearnerRow>& rows) {
   return join(all);
 }
 
-}  // namespace
-
-void Experiment::bind(Settings& s) {
-  ExperimentSettings& e = settings_;
-  s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
-  s.bind("preset", e.preset, "variant of the settings file; \"\" for none");
-  s.bind("library", e.library,
-         "shared library whose environments, learners, algorithms, rules and scenes are added to "
-         "those of the suite; \"\" for none");
-  s.bind("algorithm", e.algorithm, "what is trained", algorithms().names());
-  s.bind("learner", e.learner, meanings(learners()), learners().names());
-  if (learner_->hasNetworks()) {
-    s.bind(
-        "arithmetic", e.arithmetic,
-        "matrix products of networks: native, with the instructions of this processor; portable, "
-        "slower, with the same result on every processor that has AVX2 and FMA",
-        {"native", "portable"});
-  }
+// how long a run is, and what becomes of it
+void bindRun(Settings& s, ExperimentSettings& e) {
   s.bind("seed", e.seed, "one seed, one result", Range::atLeast(0));
   s.bind("rounds", e.rounds, "C: how often the meta-policy is aggregated", Range::between(1, 1e6));
   s.bind("updates_per_round", e.updates_per_round, "R: personalised and auxiliary updates a round",
@@ -54,42 +38,71 @@ void Experiment::bind(Settings& s) {
   s.bind("checkpoint.interval", e.checkpoint_interval,
          "rounds from one checkpoint of the whole run to the next; 0: none",
          Range::between(0, 1e6));
+}
 
-  s.bind("personal.alpha", e.personal.alpha, "personalised learning rate", Range::above(0));
-  s.bind("personal.lambda", e.personal.lambda,
+void bindPull(Settings& s, PersonalSettings& personal) {
+  s.bind("personal.alpha", personal.alpha, "personalised learning rate", Range::above(0));
+  s.bind("personal.lambda", personal.lambda,
          "strength of the pull towards the auxiliary parameters", Range::atLeast(0));
-  s.bind("personal.eta", e.personal.eta, "auxiliary learning rate", Range::atLeast(0));
-  s.bind("personal.personal_init", e.personal.personal_init,
+  s.bind("personal.eta", personal.eta, "auxiliary learning rate", Range::atLeast(0));
+  s.bind("personal.personal_init", personal.personal_init,
          "personal parameters at a round's start: the meta-policy's, or kept", {"meta", "keep"});
+}
 
-  learner_->bind(s, e.personal);
-
-  s.bind("aggregation.beta", e.aggregation.beta, "mixing: meta <- (1 - beta) meta + beta mean",
+void bindMixing(Settings& s, AggregationSettings& aggregation) {
+  s.bind("aggregation.beta", aggregation.beta, "mixing: meta <- (1 - beta) meta + beta mean",
          Range::between(0, 1));
-  s.bind("aggregation.quorum", e.aggregation.quorum,
+  s.bind("aggregation.quorum", aggregation.quorum,
          "updates that suffice once round_timeout has passed; 0 means all", Range::atLeast(0));
-  s.bind("aggregation.round_timeout", e.aggregation.round_timeout,
+  s.bind("aggregation.round_timeout", aggregation.round_timeout,
          "seconds after which a round counts as late", Range::above(0));
 
   s.bind(
-      "aggregation.catch_up", e.aggregation.catch_up,
+      "aggregation.catch_up", aggregation.catch_up,
       "how much more a task counts while the meta-policy lags behind its personal policy; 0: all "
       "tasks count the same",
       Range::between(0, 10));
-  s.bind("aggregation.rule", e.aggregation.rule,
+  s.bind("aggregation.rule", aggregation.rule,
          "what becomes of each entry: the weighted mean of all values, their median, or the mean "
          "without those at both ends",
          aggregationRules().names());
-  for (const auto& rule : rules_) rule.second->bind(s);
-  s.bind("aggregation.max_update_norm", e.aggregation.max_update_norm,
+}
+
+void bindExclusion(Settings& s, AggregationSettings& aggregation) {
+  s.bind("aggregation.max_update_norm", aggregation.max_update_norm,
          "an update further than this from the meta-policy it began with (Euclidean) is left out; "
          "0: none is",
          Range::atLeast(0));
-  s.bind("aggregation.outlier_factor", e.aggregation.outlier_factor,
+  s.bind("aggregation.outlier_factor", aggregation.outlier_factor,
          "an update further than this times the median of the round's distances is left out, where "
          "there are three or more; 0: none is",
          Range::atLeast(0));
+}
 
+}  // namespace
+
+void Experiment::bind(Settings& s) {
+  ExperimentSettings& e = settings_;
+  s.bind("experiment", e.experiment, "name of the experiment set, and of its results folder");
+  s.bind("preset", e.preset, "variant of the settings file; \"\" for none");
+  s.bind("library", e.library,
+         "shared library whose environments, learners, algorithms, rules and scenes are added to "
+         "those of the suite; \"\" for none");
+  s.bind("algorithm", e.algorithm, "what is trained", algorithms().names());
+  s.bind("learner", e.learner, meanings(learners()), learners().names());
+  if (learner_->hasNetworks()) {
+    s.bind(
+        "arithmetic", e.arithmetic,
+        "matrix products of networks: native, with the instructions of this processor; portable, "
+        "slower, with the same result on every processor that has AVX2 and FMA",
+        {"native", "portable"});
+  }
+  bindRun(s, e);
+  bindPull(s, e.personal);
+  learner_->bind(s, e.personal);
+  bindMixing(s, e.aggregation);
+  for (const auto& rule : rules_) rule.second->bind(s);
+  bindExclusion(s, e.aggregation);
   s.bind("environment.name", e.environment, "family of environments", envFamilies().names());
   family_->bind(s);
 }

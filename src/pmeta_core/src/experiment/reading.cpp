@@ -52,8 +52,8 @@ std::vector<YAML::Node> choosePreset(YAML::Node base, const std::string& source,
     for (const auto& preset : presets) known.push_back(preset.first.Scalar());
     if (presets[chosen]) return {base, presets[chosen]};
   }
-  throw Error("unknown preset '" + chosen + "': " + source +
-              (known.empty() ? " has none." : " has " + join(known) + "."));
+  if (known.empty()) throw Error("unknown preset " + shown(chosen) + ": " + source + " has none.");
+  throw Error(unknownName("preset of " + source, chosen, known));
 }
 
 // a relative path from a file of that folder; absolutePath() makes the rest of it

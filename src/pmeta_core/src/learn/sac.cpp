@@ -42,9 +42,17 @@ SacLearner::SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
       collector_(std::move(env), networks(), settings,
                  actingInput(networks(), requireTaskInput(task_input, settings)),
                  context_ ? &*context_ : nullptr),
-      update_(networks(), settings, task_input),
-      losses_{{"critic", 0}, {"actor", 0}, {"entropy", 0}, {"temperature", 0}} {
-  if (context_) losses_.push_back({"kl", 0});
+      update_(networks(), settings, task_input) {
+  report({});
+}
+
+// allocates nothing after the first call
+void SacLearner::report(const SacLosses& losses) {
+  losses_.assign({{"critic", losses.critic},
+                  {"actor", losses.actor},
+                  {"entropy", losses.entropy},
+                  {"temperature", losses.temperature}});
+  if (context_) losses_.push_back({"kl", losses.kl});
 }
 
 SacLosses SacLearner::update(const float* parameters, Optimizer<float>& optimizer, Rng& rng) {
@@ -93,8 +101,7 @@ UpdateStats SacLearner::learn(const Model& parameters, const AnyOptimizer& optim
   stats.env_steps = collect(values, rng, explorer_.empty() ? nullptr : explorer_.data());
   stats.broken_episodes = brokenEpisodes() - broken_before;
   const SacLosses losses = update(values, *std::get<Optimizer<float>*>(optimizer), rng);
-  const double all[] = {losses.critic, losses.actor, losses.entropy, losses.temperature, losses.kl};
-  for (std::size_t i = 0; i < losses_.size(); ++i) losses_[i].value = all[i];
+  report(losses);
   stats.loss = losses.critic;
   stats.updates = 1;
   return stats;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <sstream>
 
 #include "pmeta_core/base/format.h"
 
@@ -27,6 +28,31 @@ std::vector<int> readTasks(StateReader& reader, const std::string& name) {
     reader.refuse(name, "must be ascending task numbers");
   }
   return {tasks.begin(), tasks.end()};
+}
+
+void saveLosses(StateWriter& writer, const std::vector<Loss>& losses) {
+  std::string names;
+  std::vector<double> values;
+  for (const Loss& loss : losses) {
+    names += loss.name + "\n";
+    values.push_back(loss.value);
+  }
+  writer.text("loss_names", names);
+  writer.array("losses", values);
+}
+
+std::vector<Loss> readLosses(StateReader& reader) {
+  std::vector<double> values(reader.size<double>("losses", kMostLosses));
+  reader.array("losses", values);
+  const std::string text = reader.text("loss_names", kMostLosses * (kLongestLossName + 1));
+  std::istringstream names(text);
+  std::vector<Loss> losses;
+  for (std::string name; std::getline(names, name);) losses.push_back({name, 0});
+  if (losses.size() != values.size() || (!text.empty() && text.back() != '\n')) {
+    reader.refuse("loss_names", "does not name " + std::to_string(values.size()) + " losses");
+  }
+  for (std::size_t i = 0; i < losses.size(); ++i) losses[i].value = values[i];
+  return losses;
 }
 
 }  // namespace
@@ -58,6 +84,7 @@ void TaskReturn::saveState(StateWriter& writer) const {
   const std::vector<double> numbers = {mean, std, seconds};
   writer.array("counts", counts);
   writer.array("numbers", numbers);
+  saveLosses(writer, losses);
 }
 
 void TaskReturn::loadState(StateReader& reader) {
@@ -79,6 +106,7 @@ void TaskReturn::loadState(StateReader& reader) {
   updates = counts[7];
   scheduled = counts[8] != 0;
   broken_episodes = counts[9];
+  losses = readLosses(reader);
   mean = numbers[0];
   std = numbers[1];
   seconds = numbers[2];

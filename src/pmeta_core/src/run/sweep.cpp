@@ -44,94 +44,125 @@ std::optional<BegunRun> beginRun(const Experiment& experiment, bool resume) {
   return BegunRun{RunLog::reopen(experiment, point.rounds_done, std::move(lock)), point.round};
 }
 
-}  // namespace
+/// The runs of a sweep, worked off by several threads.
+class SweepRuns {
+ public:
+  SweepRuns(const SweepPlan& plan, const std::vector<Experiment>& runs,
+            const std::atomic<bool>& stop,
+            const std::function<void(const SweepProgress&)>& on_progress)
+      : resume_(plan.resume), stop_(stop), on_progress_(on_progress) {
+    progress_.total = static_cast<int>(runs.size());
+    for (const Experiment& run : runs) {
+      if (isFinished(run)) {
+        leave(run, "");
+      } else {
+        open_.push_back(&run);
+      }
+    }
+  }
 
-SweepResult runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
-                     const std::function<void(const SweepProgress&)>& on_progress) {
-  const std::vector<Experiment> runs = planSweep(plan);
-  const std::string folder = runs.front().settings().results_dir;
-  requireWritable(folder);
+  /// Does runs until none is left; for each thread.
+  void work() {
+    for (std::size_t i = next_++; i < open_.size() && !stop_; i = next_++) {
+      try {
+        if (!done(*open_[i])) return;
+      } catch (const std::exception& error) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        ++done_here_;
+        failures_[i] = {open_[i]->settings().run_id, error.what()};
+      }
+    }
+  }
 
-  std::vector<const Experiment*> open;
-  SweepProgress progress;
-  progress.total = static_cast<int>(runs.size());
-  SweepResult result{folder, progress.total, 0, false, {}};
+  /// Once all threads have ended.
+  SweepResult result(const std::string& folder) const {
+    SweepResult result{folder, progress_.total, in_use_, false, {}};
+    for (const auto& failure : failures_) result.failures.push_back(failure.second);
+    const auto failed = static_cast<int>(failures_.size());
+    result.stopped = progress_.done + in_use_ + failed < result.total;
+    return result;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  static double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  }
+
   // of one that is not run here: it is finished already, or somebody else writes it
-  const auto leave = [&](const Experiment& run, const std::string& in_use) {
-    SweepProgress left = progress;
+  void leave(const Experiment& run, const std::string& in_use) {
+    SweepProgress left = progress_;
     left.skipped = in_use.empty();
     if (left.skipped) {
-      left.done = ++progress.done;
+      left.done = ++progress_.done;
     } else {
-      ++result.in_use;
+      ++in_use_;
     }
     left.in_use = in_use;
     left.run_id = run.settings().run_id;
     left.personal_return = left.meta_return = std::numeric_limits<double>::quiet_NaN();
-    on_progress(left);
-  };
-  for (const Experiment& run : runs) {
-    if (isFinished(run)) {
-      leave(run, "");
-    } else {
-      open.push_back(&run);
-    }
+    on_progress_(left);
   }
 
-  using Clock = std::chrono::steady_clock;
-  const auto secondsSince = [](Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-  };
-  const Clock::time_point begin = Clock::now();
-  std::mutex mutex;
-  std::atomic<std::size_t> next{0};
-  double done_here = 0;
-  std::map<std::size_t, SweepFailure> failures;  // by place in `open`
-  const auto work = [&] {
-    for (std::size_t i = next++; i < open.size() && !stop; i = next++) {
-      const Clock::time_point start = Clock::now();
-      try {
-        std::optional<BegunRun> run;
-        std::string in_use;
-        try {
-          run = beginRun(*open[i], plan.resume);
-        } catch (const FolderInUse& held) {
-          in_use = held.what();
-        }
-        if (!run) {
-          const std::lock_guard<std::mutex> lock(mutex);
-          leave(*open[i], in_use);
-          continue;
-        }
-        const LocalResult ended = runLocally(
-            *open[i], &run->log, [&](const RoundBook::Round&) { return !stop; }, run->round);
-        run->log.finish(ended.stopped ? "stopped" : "finished");
-        if (ended.stopped) return;
-        std::error_code error;  // a finished run needs no checkpoints, which are most of its size
-        std::filesystem::remove_all(run->log.dir() + "/checkpoint", error);
-        const std::lock_guard<std::mutex> lock(mutex);
-        ++done_here;
-        ++progress.done;
-        progress.run_id = open[i]->settings().run_id;
-        progress.personal_return = ended.rounds.back().summary.personal_return;
-        progress.meta_return = ended.rounds.back().summary.meta_return;
-        progress.seconds = secondsSince(start);
-        progress.eta_seconds = secondsSince(begin) / done_here * (runs.size() - progress.done);
-        on_progress(progress);
-      } catch (const std::exception& error) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        ++done_here;
-        failures[i] = {open[i]->settings().run_id, error.what()};
-      }
+  // false if it was stopped
+  bool done(const Experiment& experiment) {
+    const Clock::time_point start = Clock::now();
+    std::optional<BegunRun> run;
+    std::string in_use;
+    try {
+      run = beginRun(experiment, resume_);
+    } catch (const FolderInUse& held) {
+      in_use = held.what();
     }
-  };
+    if (!run) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      leave(experiment, in_use);
+      return true;
+    }
+    const LocalResult result = runLocally(
+        experiment, &run->log, [&](const RoundBook::Round&) { return !stop_; }, run->round);
+    run->log.finish(result.stopped ? "stopped" : "finished");
+    if (result.stopped) return false;
+    std::error_code error;  // a finished run needs no checkpoints, which are most of its size
+    std::filesystem::remove_all(run->log.dir() + "/checkpoint", error);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++done_here_;
+    ++progress_.done;
+    progress_.run_id = experiment.settings().run_id;
+    progress_.personal_return = result.rounds.back().summary.personal_return;
+    progress_.meta_return = result.rounds.back().summary.meta_return;
+    progress_.seconds = secondsSince(start);
+    progress_.eta_seconds = secondsSince(begin_) / done_here_ * (progress_.total - progress_.done);
+    on_progress_(progress_);
+    return true;
+  }
+
+  const bool resume_;
+  const std::atomic<bool>& stop_;
+  const std::function<void(const SweepProgress&)>& on_progress_;
+  const Clock::time_point begin_ = Clock::now();
+  std::vector<const Experiment*> open_;
+  std::atomic<std::size_t> next_{0};
+  std::mutex mutex_;  // guards what follows
+  SweepProgress progress_;
+  int in_use_ = 0;
+  double done_here_ = 0;
+  std::map<std::size_t, SweepFailure> failures_;  // by place in open_
+};
+
+}  // namespace
+
+SweepResult runSweep(const SweepPlan& plan, const std::atomic<bool>& stop,
+                     const std::function<void(const SweepProgress&)>& on_progress) {
+  const std::vector<Experiment> experiments = planSweep(plan);
+  const std::string folder = experiments.front().settings().results_dir;
+  requireWritable(folder);
+  SweepRuns runs(plan, experiments, stop, on_progress);
   std::vector<std::thread> threads;
-  for (int j = 0; j < plan.jobs; ++j) threads.emplace_back(work);
+  for (int j = 0; j < plan.jobs; ++j) threads.emplace_back([&] { runs.work(); });
   for (std::thread& thread : threads) thread.join();
-  for (auto& [place, failure] : failures) result.failures.push_back(std::move(failure));
-  const auto failed = static_cast<int>(failures.size());
-  result.stopped = progress.done + result.in_use + failed < result.total;
-  return result;
+  return runs.result(folder);
 }
 
 }  // namespace pmeta

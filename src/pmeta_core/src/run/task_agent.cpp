@@ -87,6 +87,7 @@ std::optional<TaskAgent::RoundResult> TaskAgent::trainRound(const MetaPolicy& me
                                      }));
     personal.broken_episodes += unreported_broken_;
     personal.scheduled = scheduled;
+    personal.losses = result.losses;
     personal.env_steps = env_steps_;
     personal.updates = updates_;
     personal.seconds = watch.seconds();

@@ -135,7 +135,7 @@ Mac Authenticator::mac(const MetaPolicy& header, const ModelView& model, int rou
 }
 
 Mac Authenticator::mac(const TaskReturn& result, const std::string& task_name) const {
-  Stream stream(key_, "pmeta TaskReturn 2");
+  Stream stream(key_, "pmeta TaskReturn 3");
   stream.put(std::string_view(result.run_id));
   stream.put(result.task);
   stream.put(std::string_view(task_name));
@@ -151,6 +151,11 @@ Mac Authenticator::mac(const TaskReturn& result, const std::string& task_name) c
   stream.put(result.updates);
   stream.put(result.broken_episodes);
   stream.put(result.seconds);
+  stream.put(std::uint64_t{result.losses.size()});
+  for (const Loss& loss : result.losses) {
+    stream.put(std::string_view(loss.name));
+    stream.put(loss.value);
+  }
   return stream.finish();
 }
 

@@ -1,9 +1,11 @@
 // What becomes of returns as they arrive: complete rounds, in order, with their means.
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
 #include "pmeta_core/storage/round_book.h"
 
 namespace pmeta {
@@ -21,6 +23,22 @@ double meanReturn(const std::vector<RoundRow>& rows, PolicyKind policy, Split sp
     ++n;
   }
   return n == 0 ? std::numeric_limits<double>::quiet_NaN() : sum / n;
+}
+
+// what losses.csv is made of; their values may be any
+template <class Refuse>
+void requireLosses(const TaskReturn& result, const Refuse& refuse) {
+  if (result.losses.size() > kMostLosses) {
+    refuse("it has " + std::to_string(result.losses.size()) + " losses");
+  }
+  for (const Loss& loss : result.losses) {
+    const bool word = std::all_of(loss.name.begin(), loss.name.end(), [](unsigned char c) {
+      return c == '_' || (c < 128 && std::isalnum(c) != 0);
+    });
+    if (!word || loss.name.empty() || loss.name.size() > kLongestLossName) {
+      refuse("it names a loss " + shown(loss.name) + ", which is no word");
+    }
+  }
 }
 
 }  // namespace
@@ -74,6 +92,7 @@ void RoundBook::requireResult(const TaskReturn& result) const {
     refuse("its deviation is " + formatNumber(result.std) + ", its wall time " +
            formatNumber(result.seconds) + " s");
   }
+  requireLosses(result, refuse);
   if (result.episodes < 1) refuse("it is of " + std::to_string(result.episodes) + " episodes");
   std::int64_t env_steps = env_steps_[result.task];
   std::int64_t updates = updates_[result.task];

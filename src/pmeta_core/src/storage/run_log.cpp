@@ -1,8 +1,5 @@
 #include "pmeta_core/storage/run_log.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -25,6 +22,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::seconds kManifestInterval{1};
+constexpr char kRounds[] = "/rounds.csv";
+constexpr char kLosses[] = "/losses.csv";
+constexpr char kLossesHeader[] = "round,task,loss,value";
 
 std::string manifestStatus(const std::string& run_dir) { return manifestText(run_dir, "status"); }
 
@@ -73,6 +73,37 @@ bool parseRow(const std::string& line, RoundRow& row) {
          parseNumber(fields[10], r.seconds);
 }
 
+[[noreturn]] void refuseLine(const std::string& path, const std::string& line, int number) {
+  throw Error(path + " line " + std::to_string(number) + " is " + shown(line) +
+              ", which no run writes: it has been altered.");
+}
+
+// the whole lines below a table's header, with their numbers, until `on_line` returns false
+void readTable(const std::string& path, const std::string& header,
+               const std::function<bool(const std::string& line, int number)>& on_line) {
+  requireRegularFile(path, "the table");
+  std::ifstream file(path);
+  std::string line;
+  bool headed = false;
+  for (int number = 1; std::getline(file, line); ++number) {
+    // what a spreadsheet or an editor leaves behind
+    if (number == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (line.empty()) continue;
+    if (!headed) {
+      if (line != header) {
+        throw Error(path + " begins with " + shown(line) + " but must begin with '" + header +
+                    "': it has been altered, or is of another version.");
+      }
+      headed = true;
+      continue;
+    }
+    if (file.eof()) return;  // a line that was cut off
+    if (!on_line(line, number)) return;
+  }
+  if (!headed) throw Error(path + " is empty: it has been altered, or was never written.");
+}
+
 // the whole lines of rounds 1 to `last`, with the header; `evaluated` is the last that has lines
 std::string firstRounds(const std::string& path, int last, int evaluated) {
   std::string kept = std::string(RunLog::csvHeader()) + "\n";
@@ -87,6 +118,19 @@ std::string firstRounds(const std::string& path, int last, int evaluated) {
     throw Error(path + " ends with round " + std::to_string(newest) + " but the checkpoint knows " +
                 std::to_string(evaluated) + " rounds: the run cannot be resumed.");
   }
+  return kept;
+}
+
+// the same of losses.csv
+std::string firstLosses(const std::string& path, int last) {
+  std::string kept = std::string(kLossesHeader) + "\n";
+  readTable(path, kLossesHeader, [&](const std::string& line, int number) {
+    int round = 0;
+    if (!parseWhole(line.substr(0, line.find(',')), round)) refuseLine(path, line, number);
+    if (round > last) return false;
+    kept += line + "\n";
+    return true;
+  });
   return kept;
 }
 
@@ -113,8 +157,9 @@ RunLog RunLog::create(const Experiment& experiment, RunLock lock) {
   experiment.copyModel();
   writeFileAtomically(log.dir_ + "/config.yaml", experiment.runYaml());
   log.writeManifest("running");
-  writeFileAtomically(log.dir_ + "/rounds.csv", std::string(csvHeader()) + "\n");
-  log.openCsv();
+  writeFileAtomically(log.dir_ + kRounds, std::string(csvHeader()) + "\n");
+  writeFileAtomically(log.dir_ + kLosses, std::string(kLossesHeader) + "\n");
+  log.openTables();
   return log;
 }
 
@@ -133,43 +178,39 @@ RunLog RunLog::reopen(const Experiment& experiment, int rounds_done, RunLock loc
   const EvaluationSchedule evaluations = experiment.evaluationSchedule();
   int evaluated = rounds_done;
   while (evaluated > 0 && !evaluations.includes(evaluated)) --evaluated;
-  writeFileAtomically(dir + "/rounds.csv",
-                      firstRounds(dir + "/rounds.csv", rounds_done, evaluated));
+  const std::string rounds = firstRounds(dir + kRounds, rounds_done, evaluated);
+  const std::string losses = firstLosses(dir + kLosses, rounds_done);
+  writeFileAtomically(dir + kRounds, rounds);
+  writeFileAtomically(dir + kLosses, losses);
   log.writeManifest("running");
-  log.openCsv();
+  log.openTables();
   return log;
 }
 
-void RunLog::openCsv() {
-  csv_.open(dir_ + "/rounds.csv", std::ios::app);
-  std::error_code error;
-  csv_size_ = std::filesystem::file_size(dir_ + "/rounds.csv", error);
-  if (!csv_ || error) throw Error("cannot write " + dir_ + "/rounds.csv: is the disk full?");
+void RunLog::openTables() {
+  rounds_.emplace(dir_ + kRounds);
+  losses_.emplace(dir_ + kLosses);
 }
 
 void RunLog::sync() {
-  const int file = ::open((dir_ + "/rounds.csv").c_str(), O_WRONLY | O_CLOEXEC);
-  const bool synced = file >= 0 && ::fsync(file) == 0;
-  const std::string why = std::strerror(errno);
-  if (file >= 0) ::close(file);
-  if (!synced) throw Error("cannot write " + dir_ + "/rounds.csv (" + why + ").");
+  losses_->sync();
+  rounds_->sync();
 }
 
 void RunLog::write(const RoundBook::Round& round) {
-  std::string lines;
-  for (const RoundRow& row : round.rows) lines += csvLine(row) + "\n";
-  if (!csv_.is_open()) openCsv();
-  csv_ << lines << std::flush;
-  if (!csv_) {
-    const std::string why = std::strerror(errno);
-    // no half a round: whoever tries again finds the file as it was
-    csv_.close();
-    csv_.clear();
-    std::error_code ignored;
-    std::filesystem::resize_file(dir_ + "/rounds.csv", csv_size_, ignored);
-    throw Error("cannot write " + dir_ + "/rounds.csv (" + why + "): is the disk full?");
+  std::string rows, losses;
+  for (const RoundRow& row : round.rows) {
+    rows += csvLine(row) + "\n";
+    losses += lossLines(row.result);
   }
-  csv_size_ += lines.size();
+  losses_->append(losses);
+  try {
+    rounds_->append(rows);
+  } catch (const Error&) {
+    // no half a round: whoever tries again finds both files as they were
+    losses_->takeBack();
+    throw;
+  }
   rounds_done_ = round.summary.round;
   broken_episodes_ = round.summary.broken_episodes;
   if (Clock::now() < next_manifest_) return;
@@ -208,6 +249,15 @@ std::string RunLog::csvLine(const RoundRow& row) {
          name(r.policy) + "," + std::to_string(r.context_episodes) + "," + formatNumber(r.mean) +
          "," + formatNumber(r.std) + "," + std::to_string(r.episodes) + "," +
          std::to_string(row.env_steps) + "," + std::to_string(row.updates) + "," + seconds;
+}
+
+std::string RunLog::lossLines(const TaskReturn& result) {
+  std::string lines;
+  for (const Loss& loss : result.losses) {
+    lines += std::to_string(result.round) + "," + std::to_string(result.task) + "," + loss.name +
+             "," + formatNumber(loss.value) + "\n";
+  }
+  return lines;
 }
 
 void RunLog::writeManifest(const std::string& status, const std::string& reason) {
@@ -253,32 +303,11 @@ void requireUnfinished(const std::string& run_dir) {
 
 void readRounds(const std::string& path,
                 const std::function<bool(const RoundRow& row, const std::string& line)>& on_row) {
-  requireRegularFile(path, "the table");
-  std::ifstream file(path);
-  std::string line;
-  bool headed = false;
-  for (int number = 1; std::getline(file, line); ++number) {
-    // what a spreadsheet or an editor leaves behind
-    if (number == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (line.empty()) continue;
-    if (!headed) {
-      if (line != RunLog::csvHeader()) {
-        throw Error(path + " begins with " + shown(line) + " but must begin with '" +
-                    RunLog::csvHeader() + "': it has been altered, or is of another version.");
-      }
-      headed = true;
-      continue;
-    }
-    if (file.eof()) return;  // a line that was cut off
+  readTable(path, RunLog::csvHeader(), [&](const std::string& line, int number) {
     RoundRow row;
-    if (!parseRow(line, row)) {
-      throw Error(path + " line " + std::to_string(number) + " is " + shown(line) +
-                  ", which no run writes: it has been altered.");
-    }
-    if (!on_row(row, line)) return;
-  }
-  if (!headed) throw Error(path + " is empty: it has been altered, or was never written.");
+    if (!parseRow(line, row)) refuseLine(path, line, number);
+    return on_row(row, line);
+  });
 }
 
 void writeFileAtomically(const std::string& path, const std::string& text) {

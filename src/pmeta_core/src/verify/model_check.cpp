@@ -11,6 +11,7 @@
 
 #include "pmeta_core/base/csv_table.h"
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/base/names.h"
 #include "pmeta_core/base/number.h"
 #include "pmeta_core/env/ant.h"
 #include "pmeta_core/env/half_cheetah.h"
@@ -154,7 +155,7 @@ bool isModelKind(const std::string& kind) { return kinds().count(kind) > 0; }
 ModelReport checkModel(const std::string& kind, const std::string& path) {
   const auto found = kinds().find(kind);
   if (found == kinds().end()) {
-    throw Error("unknown model '" + kind + "': known are " + join(modelKinds()) + ".");
+    throw Error(unknownName("model", kind, modelKinds()));
   }
   const auto model = MujocoModel::open("", found->second());
   const auto arrays = arraysOf(model->get());

@@ -37,11 +37,7 @@ std::unique_ptr<TrajectorySimulator> makeTrajectorySimulator(const std::string& 
                                                              const std::string& tasks_file) {
   const auto found = kinds().find(kind);
   if (found == kinds().end()) {
-    const std::vector<std::string> known = concatenated({trajectoryKinds(), modelKinds()});
-    const std::string guess = nearest(kind, known);
-    throw Error("unknown trajectories '" + kind + "'" +
-                (guess.empty() ? "." : ": did you mean '" + guess + "'?") + " Known are " +
-                join(known) + ".");
+    throw Error(unknownName("trajectories", kind, concatenated({trajectoryKinds(), modelKinds()})));
   }
   return found->second(tasks_file);
 }

@@ -181,22 +181,27 @@ void TaskAgentNode::train() {
   }
 }
 
+void TaskAgentNode::evaluate(const pmeta::MetaPolicy& meta) {
+  if (meta.round == 0 || !experiment_.evaluatesMeta() ||
+      !(meta.evaluate || experiment_.evaluationSchedule().includes(meta.round))) {
+    return;
+  }
+  setState(AgentStatus::EVALUATING,
+           "evaluating the meta-policy of round " + std::to_string(meta.round));
+  for (const pmeta::TaskReturn& result : agent_.evaluateMeta(meta)) deliver(result);
+  if (trajectory_pub_) {
+    publishEpisode(agent_.recordMeta(meta), meta.round, pmeta::PolicyKind::kMeta);
+  }
+}
+
 void TaskAgentNode::trainFrom(const pmeta::MetaPolicy& meta) {
   const int rounds = experiment_.settings().rounds;
   waitForAggregator();
-  if (meta.round > 0 && experiment_.evaluatesMeta() &&
-      (meta.evaluate || experiment_.evaluationSchedule().includes(meta.round))) {
-    setState(AgentStatus::EVALUATING,
-             "evaluating the meta-policy of round " + std::to_string(meta.round));
-    for (const pmeta::TaskReturn& result : agent_.evaluateMeta(meta)) deliver(result);
-    if (trajectory_pub_)
-      publishEpisode(agent_.recordMeta(meta), meta.round, pmeta::PolicyKind::kMeta);
-  }
+  evaluate(meta);
   if (meta.round >= rounds) {
     setState(AgentStatus::DONE, "all " + std::to_string(rounds) + " rounds are done");
     return;
   }
-
   if (!agent_.trains()) {
     setState(AgentStatus::WAITING,
              "test task: waiting for the meta-policy of round " + std::to_string(meta.round + 1));

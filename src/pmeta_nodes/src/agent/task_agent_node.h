@@ -33,13 +33,13 @@ namespace pmeta_nodes {
 /// A TaskAgent on ROS: a training thread fed with the newest meta-policy, and the topics around it.
 ///
 /// Subscribes to meta_policy and round; publishes auxiliary, returns, agent_status and
-/// task_<i>/trajectory. What the aggregator must get is sent again until a newer meta-policy, or
+/// task_I/trajectory. What the aggregator must get is sent again until a newer meta-policy, or
 /// the end of the run, shows that it has it. With a key_file, what it sends is signed and what is
 /// not authentic it ignores. A checkpoint is on the disk before that round's update is sent, so an
 /// agent that is killed comes back with all that anybody has seen of it; where the aggregator had
 /// to go back some rounds, the agent follows. Training that cannot go on (TaskFailed) is told by
 /// the state FAILED until the run has ended: the same would come of it if it were started again.
-/// The last round's personal policy stays on this machine, as policies/task_<i>.safetensors of the
+/// The last round's personal policy stays on this machine, as policies/task_I.safetensors of the
 /// run folder.
 class TaskAgentNode {
  public:
@@ -58,6 +58,7 @@ class TaskAgentNode {
   bool isAuthentic(const std::string& kind, pmeta::Authenticity authenticity);
 
   void train();
+  void evaluate(const pmeta::MetaPolicy& meta);
   void trainFrom(const pmeta::MetaPolicy& meta);
   void returnTo(const pmeta::MetaPolicy& meta);
   void saveCheckpoint(int round);

@@ -173,6 +173,10 @@ pmeta_msgs::TaskReturn toMsg(const pmeta::TaskReturn& result, const std::string&
   msg.env_steps = static_cast<std::uint64_t>(result.env_steps);
   msg.updates = static_cast<std::uint64_t>(result.updates);
   msg.broken_episodes = static_cast<std::uint64_t>(result.broken_episodes);
+  for (const pmeta::Loss& loss : result.losses) {
+    msg.loss_names.push_back(loss.name);
+    msg.losses.push_back(loss.value);
+  }
   msg.wall_s = result.seconds;
   return msg;
 }
@@ -201,6 +205,13 @@ pmeta::TaskReturn fromMsg(const pmeta_msgs::TaskReturn& msg) {
   result.env_steps = static_cast<std::int64_t>(msg.env_steps);
   result.updates = static_cast<std::int64_t>(msg.updates);
   result.broken_episodes = static_cast<std::int64_t>(msg.broken_episodes);
+  if (msg.loss_names.size() != msg.losses.size()) {
+    throw Error("a return has " + std::to_string(msg.losses.size()) + " losses of " +
+                std::to_string(msg.loss_names.size()) + " names.");
+  }
+  for (std::size_t i = 0; i < msg.losses.size(); ++i) {
+    result.losses.push_back({msg.loss_names[i], msg.losses[i]});
+  }
   result.seconds = msg.wall_s;
   return result;
 }

@@ -13,8 +13,9 @@ namespace pmeta_nodes {
 template <class T>
 class Mailbox {
  public:
-  explicit Mailbox(std::size_t capacity) : capacity_(capacity) {}
+  explicit Mailbox(std::size_t capacity) : capacity_(capacity) {}  ///< `capacity`: at least 1
 
+  /// Does nothing once the box is closed; never waits.
   void push(T item) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

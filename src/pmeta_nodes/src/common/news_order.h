@@ -9,6 +9,7 @@ namespace pmeta_nodes {
 /// moment from which on news count, has been heard before or was never for this node.
 class NewsOrder {
  public:
+  /// `since`: from which on news count.
   explicit NewsOrder(const ros::Time& since = ros::Time()) : newest_(since) {}
 
   /// Is a message of that stamp no repetition? If so it is the newest from now on.

@@ -21,7 +21,7 @@ class RecentReturns {
   /// All that are kept, older first.
   std::vector<pmeta_msgs::TaskReturn::ConstPtr> all() const;
 
-  void forgetOtherRuns(const std::string& run_id);
+  void forgetOtherRuns(const std::string& run_id);  ///< drops all that is not of that run
 
  private:
   pmeta_msgs::TaskReturn::ConstPtr newest_;

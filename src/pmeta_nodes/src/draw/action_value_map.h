@@ -11,7 +11,7 @@ namespace pmeta_nodes {
 
 /// Where the map of a policy's action values is drawn.
 struct ActionValuePlace {
-  std::string frame;
+  std::string frame;  ///< of the lane
   Point corner;       ///< the lower left one of the square, in `frame`
   double side = 0;    ///< of the square
   double letter = 0;  ///< height of letters

@@ -10,23 +10,23 @@ namespace pmeta_nodes {
 /// Cards for all tasks, side by side between a scene's title and legend: each has a header with the
 /// task's name, and below it one lane for both policies, or a lane for each.
 ///
-/// A card's frame "task_<i>" has its origin in the middle of the card.
+/// A card's frame "task_I" has its origin in the middle of the card.
 struct Cards {
-  int num_tasks = 0;
-  int num_train = 0;  ///< tasks from there on are test tasks, which have no personal policy
-  int columns = 1;
-  int lanes = 2;        ///< on a card: 1 or 2
-  bool beside = false;  ///< are two lanes side by side, personal on the left? Else it is above
-  double slot_width = 0;
+  int num_tasks = 0;       ///< cards, test tasks included
+  int num_train = 0;       ///< tasks from there on are test tasks, which have no personal policy
+  int columns = 1;         ///< cards side by side
+  int lanes = 2;           ///< on a card: 1 or 2
+  bool beside = false;     ///< are two lanes side by side, personal on the left? Else it is above
+  double slot_width = 0;   ///< of a card with the gap around it
   double slot_height = 0;  ///< of a card with the gap around it
   double letter = 0;       ///< height of letters
-  double lane_width = 0;
+  double lane_width = 0;   ///< where content may be drawn
   double lane_height = 0;  ///< without its label
   double scale = 0;        ///< units of the scene for a unit of the lane's content
 
-  bool isTest(int task) const { return task >= num_train; }
-  double width() const;
-  double height() const;
+  bool isTest(int task) const { return task >= num_train; }  ///< has the task a meta-policy alone?
+  double width() const;                                      ///< of a card
+  double height() const;                                     ///< of a card
 
   /// The middle of a lane's lower edge on its card.
   Point laneBottom(int task, int policy) const;
@@ -36,10 +36,10 @@ struct Cards {
 Cards layoutCards(int num_tasks, int num_train, int lanes, double content_width,
                   double content_height);
 
-/// "task_<i>"
+/// "task_I"
 std::string taskFrame(int task);
 
-/// Frames "task_<i>" in the world frame.
+/// Frames "task_I" in the world frame.
 std::vector<geometry_msgs::TransformStamped> cardFrames(const Cards& cards);
 
 /// The policies whose lanes a card has: a test task has only meta's.
@@ -106,9 +106,10 @@ class LaneScene : public Scene {
   double scale() const { return cards_.scale; }  ///< units of the scene for 1 of its content's
 
  protected:
+  /// `cards`: as layoutCards() gives them.
   explicit LaneScene(const Cards& cards) : cards_(cards) {}
 
-  const Cards cards_;
+  const Cards cards_;  ///< where lanes are
 
  private:
   /// One lane, so many seconds after the episode's start.

@@ -10,9 +10,9 @@
 
 namespace pmeta_nodes {
 
-using Color = std_msgs::ColorRGBA;
+using Color = std_msgs::ColorRGBA;  ///< r, g, b and opacity, 0 to 1
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kPi = 3.14159265358979323846;  ///< a half turn, rad
 
 /// Width of a letter, in heights, on average.
 constexpr double kLetterWidth = 0.46;
@@ -29,9 +29,10 @@ Color viridis(double x);
 /// Relative luminance, 0 to 1: dark ink reads on light colours only.
 double luminance(const Color& color);
 
+/// A place in the frame's plane.
 struct Point {
-  double x = 0;
-  double y = 0;
+  double x = 0;  ///< to the right, in units of the frame
+  double y = 0;  ///< upwards
 };
 
 /// A marker of that place and identity, all else as rviz needs it.
@@ -45,6 +46,7 @@ visualization_msgs::Marker textMarker(const std::string& frame, const std::strin
 /// Flat figures as one marker of coloured triangles, which rviz draws without shading.
 class Figure {
  public:
+  /// `layer`: height above the frame's plane, on which what lies higher is seen.
   Figure(const std::string& frame, const std::string& ns, int id, double layer)
       : marker_(makeMarker(frame, ns, id)), z_(layer) {
     marker_.type = visualization_msgs::Marker::TRIANGLE_LIST;
@@ -54,7 +56,7 @@ class Figure {
 
   /// What follows is drawn above what was drawn so far.
   void raise() { z_ += 0.01; }
-  void moveTo(double layer) { z_ = layer; }
+  void moveTo(double layer) { z_ = layer; }  ///< what follows is drawn at that height
 
   /// A polygon all of whose corners can be seen from `centre`.
   void polygon(const Point& centre, const std::vector<Point>& corners, const Color& color) {
@@ -63,11 +65,13 @@ class Figure {
     }
   }
 
+  /// Edges by their places, left < right and bottom < top.
   void rectangle(double left, double bottom, double right, double top, const Color& color) {
     triangle({left, bottom}, {right, bottom}, {right, top}, color);
     triangle({left, bottom}, {right, top}, {left, top}, color);
   }
 
+  /// Of 20 corners.
   void disc(const Point& centre, double radius, const Color& color) {
     sector(centre, radius, 0, 2 * kPi, color);
   }
@@ -105,6 +109,7 @@ class Figure {
     polygon(centre, rim, color);
   }
 
+  /// A line of that width with flat ends; nothing if both ends are one.
   void segment(const Point& from, const Point& to, double width, const Color& color) {
     const double length = std::hypot(to.x - from.x, to.y - from.y);
     if (length == 0) return;
@@ -114,6 +119,7 @@ class Figure {
     triangle({from.x + dx, from.y + dy}, {to.x - dx, to.y - dy}, {to.x + dx, to.y + dy}, color);
   }
 
+  /// Segments from point to point; nothing of fewer than two.
   void polyline(const std::vector<Point>& points, double width, const Color& color) {
     for (std::size_t i = 1; i < points.size(); ++i) {
       segment(points[i - 1], points[i], width, color);

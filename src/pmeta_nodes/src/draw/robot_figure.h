@@ -11,14 +11,14 @@ namespace pmeta_nodes {
 
 /// A place in a model's world, m.
 struct Position {
-  double x = 0;
-  double y = 0;
-  double z = 0;
+  double x = 0;  ///< forward
+  double y = 0;  ///< to the left
+  double z = 0;  ///< upwards
 };
 
 /// How a model is drawn.
 struct RobotPicture {
-  std::string frame;
+  std::string frame;  ///< that it is drawn in
   int id = 0;         ///< of the robot: markers of different ids have different names
   Color color;        ///< of its darkest part
   double scale = 1;   ///< units of the frame for 1 m

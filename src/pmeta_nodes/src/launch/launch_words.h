@@ -14,6 +14,7 @@ struct LaunchArguments {
   std::set<std::string> switches;   ///< of those that are true or false
 };
 
+/// Reads what arguments they declare; throws Error if one cannot be read.
 LaunchArguments readLaunchFile(const std::filesystem::path& file);
 
 /// What prepare_run is to know of words key:=value as roslaunch takes them: all but the arguments

@@ -7,9 +7,9 @@ namespace pmeta_nodes {
 
 /// A node that is registered with a ROS master and answers.
 struct LiveNode {
-  std::string name;
-  std::string uri;
-  int pid = 0;
+  std::string name;  ///< its full name
+  std::string uri;   ///< of its XML-RPC interface
+  int pid = 0;       ///< of its process, on the host that `uri` names
 };
 
 /// Which of the nodes of these names live. The registrations that killed nodes leave behind do not

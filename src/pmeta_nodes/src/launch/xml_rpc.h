@@ -12,9 +12,9 @@ namespace pmeta_nodes {
 /// A call of the ROS master's or a node's XML-RPC interface; the caller's name comes first among
 /// the arguments.
 struct XmlRpcCall {
-  std::string uri;
-  std::string method;
-  std::vector<std::string> arguments;
+  std::string uri;                     ///< whom to call
+  std::string method;                  ///< e.g. "getPid"
+  std::vector<std::string> arguments;  ///< all of them text
 };
 
 /// Makes all calls at once and gives their values in the same order; none where nobody has answered

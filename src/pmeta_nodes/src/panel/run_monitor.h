@@ -39,7 +39,7 @@ class RunMonitor : public QObject {
   Q_OBJECT
 
  public:
-  explicit RunMonitor(QObject* parent);
+  explicit RunMonitor(QObject* parent);  ///< begins to follow; asks ROS for nothing else
   ~RunMonitor() override;
 
   /// What is known now. The next message emits changed() again.
@@ -51,7 +51,7 @@ class RunMonitor : public QObject {
   /// Asks, and emits answered() once there is an answer or none has come within five seconds.
   /// One request at a time: does nothing while busy().
   void ask(Request request);
-  bool busy() const { return busy_; }
+  bool busy() const { return busy_; }  ///< is a request on its way?
 
  Q_SIGNALS:
   /// Something new has come since takeState().

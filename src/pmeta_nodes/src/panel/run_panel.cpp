@@ -91,18 +91,7 @@ QPushButton* RunPanel::addButton(const QString& name, const QString& text) {
   return button;
 }
 
-void RunPanel::build() {
-  experiment_ = addLabel("experiment", "font-weight: bold");
-  state_ = addLabel("state", "");
-  state_->setAlignment(Qt::AlignRight);
-  auto* head = new QHBoxLayout;
-  head->addWidget(experiment_, 1);
-  head->addWidget(state_);
-
-  progress_ = new QProgressBar(this);
-  progress_->setObjectName("progress");
-  progress_->setAlignment(Qt::AlignCenter);
-
+QLayout* RunPanel::buildNumbers() {
   personal_ = addLabel("pp", kPersonalStyle);
   meta_ = addLabel("mp", kMetaStyle);
   test_ = addLabel("test", kMetaStyle);
@@ -115,10 +104,10 @@ void RunPanel::build() {
   numbers->addWidget(meta_, 0, 1);
   numbers->addWidget(eta_, 1, 0);
   numbers->addWidget(test_, 1, 1);
+  return numbers;
+}
 
-  missing_ = addLabel("missing", kWarningStyle);
-  message_ = addLabel("message", kFaintStyle);
-
+void RunPanel::buildTable() {
   tasks_ = new QTableWidget(0, kColumns, this);
   tasks_->setObjectName("tasks");
   tasks_->setHorizontalHeaderLabels({"task", "personal", "meta", "agent", "updates/s"});
@@ -133,7 +122,25 @@ void RunPanel::build() {
   tasks_->setShowGrid(false);
   tasks_->setWordWrap(false);
   tasks_->setAlternatingRowColors(true);
+}
 
+void RunPanel::build() {
+  experiment_ = addLabel("experiment", "font-weight: bold");
+  state_ = addLabel("state", "");
+  state_->setAlignment(Qt::AlignRight);
+  auto* head = new QHBoxLayout;
+  head->addWidget(experiment_, 1);
+  head->addWidget(state_);
+
+  progress_ = new QProgressBar(this);
+  progress_->setObjectName("progress");
+  progress_->setAlignment(Qt::AlignCenter);
+
+  QLayout* numbers = buildNumbers();
+  missing_ = addLabel("missing", kWarningStyle);
+  message_ = addLabel("message", kFaintStyle);
+
+  buildTable();
   pause_ = addButton("pause", "Pause");
   evaluate_ = addButton("evaluate", "Evaluate now");
   checkpoint_ = addButton("checkpoint", "Save checkpoint");

@@ -9,6 +9,7 @@
 #endif
 
 class QLabel;
+class QLayout;
 class QProgressBar;
 class QPushButton;
 class QTableWidget;
@@ -23,15 +24,18 @@ class RunPanel : public rviz::Panel {
   Q_OBJECT
 
  public:
-  explicit RunPanel(QWidget* parent = nullptr);
+  explicit RunPanel(QWidget* parent = nullptr);  ///< as pluginlib wants it
 
   /// Keeps the scene as large as the window allows.
   void onInitialize() override;
+  /// Sees when the window takes another size.
   bool eventFilter(QObject* watched, QEvent* event) override;
 
  private:
   void fitView(const QSize& window);
   void build();
+  QLayout* buildNumbers();
+  void buildTable();
   QLabel* addLabel(const QString& name, const QString& style);
   QPushButton* addButton(const QString& name, const QString& text);
   void follow();

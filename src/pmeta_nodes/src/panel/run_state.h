@@ -17,37 +17,39 @@ namespace pmeta_nodes {
 
 /// A return as the panel shows it.
 struct ShownReturn {
+  /// Undiscounted, in units of reward; NaN: none yet.
   double mean = std::numeric_limits<double>::quiet_NaN();
-  std::uint32_t round = 0;
+  std::uint32_t round = 0;  ///< that it is of; 0: none yet
 };
 
 /// What is known of a task and its agent.
 struct TaskState {
-  std::string run_id;
-  std::string name;
-  bool is_test = false;
-  RecentReturns personal;
-  RecentReturns meta;
-  std::optional<pmeta_msgs::AgentStatus> status;
-  std::chrono::steady_clock::time_point heard;  ///< when the status came
+  std::string run_id;                             ///< of the run that all of this is of
+  std::string name;                               ///< of the task
+  bool is_test = false;                           ///< no personal policy, and no training
+  RecentReturns personal;                         ///< on this task
+  RecentReturns meta;                             ///< on this task, after the most exploration
+  std::optional<pmeta_msgs::AgentStatus> status;  ///< the newest; none before the first
+  std::chrono::steady_clock::time_point heard;    ///< when the status came
 };
 
 /// What is known of the run that a panel shows: the newest message of each kind, and the texts that
 /// are made of them. Plain values, neither ROS's nor Qt's machinery.
 struct RunState {
-  bool connected = false;  ///< is there an aggregator that publishes?
-  std::optional<pmeta_msgs::RoundSummary> summary;
-  std::map<std::uint32_t, TaskState> tasks;
+  bool connected = false;                           ///< is there an aggregator that publishes?
+  std::optional<pmeta_msgs::RoundSummary> summary;  ///< the newest; none before the first
+  std::map<std::uint32_t, TaskState> tasks;         ///< by number
 
   /// A summary of another run begins anew.
   void take(const pmeta_msgs::RoundSummary& message);
   /// Returns and statuses of another run than the summary's are ignored.
   void take(const pmeta_msgs::TaskReturn& message);
+  /// `now`: when it came.
   void take(const pmeta_msgs::AgentStatus& message, std::chrono::steady_clock::time_point now);
 
   /// Is there a run that has not ended?
   bool active() const;
-  bool paused() const;
+  bool paused() const;  ///< does an active run wait for somebody to let it go on?
 
   /// "running", "late", "paused", "finished", "stopped", "lost" (its aggregator has gone) or "no
   /// run".

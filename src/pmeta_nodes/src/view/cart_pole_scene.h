@@ -17,7 +17,7 @@ class CartPoleScene : public LaneScene {
   static constexpr double kCartHeight = 0.24;    ///< m; the pole turns about the middle of its top
   static constexpr double kLongestPole = 3;      ///< m
 
-  CartPoleScene(const pmeta::CartPoleFamily& family, int num_tasks);
+  CartPoleScene(const pmeta::CartPoleFamily& family, int num_tasks);  ///< as SceneMaker has it
 
   std::vector<geometry_msgs::TransformStamped> frames() const override;
   std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;

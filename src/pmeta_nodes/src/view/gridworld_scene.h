@@ -10,9 +10,9 @@ namespace pmeta_nodes {
 
 /// One grid to draw; cell (r, c) is state r * stride + c.
 struct GridGeometry {
-  pmeta::GridworldTask task;
-  int stride = 0;
-  std::string name;  ///< the task's, e.g. "grid_4x4"
+  pmeta::GridworldTask task;  ///< size, landmark and slip
+  int stride = 0;             ///< cells along each side of the largest grid
+  std::string name;           ///< the task's, e.g. "grid_4x4"
 };
 
 /// Side of every grid in the scene's units; grids with more cells have smaller cells.
@@ -33,7 +33,7 @@ visualization_msgs::MarkerArray gridworldScene(const std::vector<GridGeometry>& 
 /// The gridworlds: cells coloured by value, greedy actions and the paths of both policies.
 class GridworldScene : public Scene {
  public:
-  GridworldScene(const pmeta::GridworldFamily& family, int num_tasks);
+  GridworldScene(const pmeta::GridworldFamily& family, int num_tasks);  ///< as SceneMaker has it
 
   std::vector<geometry_msgs::TransformStamped> frames() const override;
   std::string problem(const pmeta_msgs::Trajectory& trajectory) const override;

@@ -9,13 +9,14 @@ namespace pmeta_nodes {
 /// cars, which play the episode; on the right both trajectories in the plane of position and
 /// velocity.
 ///
-/// Frames "task_<i>/hill" and "task_<i>/phase" have their origins at position 0 and height or
+/// Frames "task_I/hill" and "task_I/phase" have their origins at position 0 and height or
 /// velocity 0.
 class MountainCarScene : public LaneScene {
  public:
   /// s; the environment knows no seconds, this is what Gym draws it with.
   static constexpr double kTimeStep = 1 / 30.0;
 
+  /// As SceneMaker has it.
   MountainCarScene(const pmeta::MountainCarFamily& family, int num_tasks);
 
   std::vector<geometry_msgs::TransformStamped> frames() const override;

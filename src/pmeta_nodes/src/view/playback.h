@@ -28,7 +28,9 @@ class Playback {
   void forgetOtherRuns(const std::string& run_id);
 
   double seconds() const { return seconds_; }  ///< since the start of the episodes
+  /// The episode that plays; null before the first.
   const pmeta_msgs::Trajectory::ConstPtr& personal() const { return personal_.shown; }
+  /// The episode that plays; null before the first.
   const pmeta_msgs::Trajectory::ConstPtr& meta() const { return meta_.shown; }
 
  private:

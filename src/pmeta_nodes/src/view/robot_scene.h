@@ -21,8 +21,8 @@ struct RobotTarget {
 /// forward kinematics of the recorded configurations, while floor and view follow the body that
 /// MujocoView names, the torso.
 ///
-/// "task_<i>/personal" and "task_<i>/meta" have their origins on the floor below the torso, x along
-/// the lane, y up; "task_<i>/meta/robot" and its like below them is the model's world, moved along
+/// "task_I/personal" and "task_I/meta" have their origins on the floor below the torso, x along
+/// the lane, y up; "task_I/meta/robot" and its like below them is the model's world, moved along
 /// with the torso, and turned so that z goes up the lane. One metre is scale() in both.
 class RobotScene : public Scene {
  public:

@@ -19,18 +19,18 @@ namespace pmeta_nodes {
 /// What is known of one policy on one task. Null: nothing yet.
 struct PolicyView {
   pmeta_msgs::Trajectory::ConstPtr episode;  ///< must be drawable, see Scene::problem()
-  pmeta_msgs::TaskReturn::ConstPtr result;
+  pmeta_msgs::TaskReturn::ConstPtr result;   ///< of the last complete round that had one
 };
 
 /// Both policies on one task.
 struct TaskView {
-  PolicyView personal;
-  PolicyView meta;
+  PolicyView personal;  ///< empty for a test task
+  PolicyView meta;      ///< empty with independent training
 };
 
 /// All that a scene shows.
 struct SceneContent {
-  std::string experiment;
+  std::string experiment;        ///< its name, for the title
   int rounds = 0;                ///< C
   bool has_trajectories = true;  ///< false: agents send none, and the title says so
   bool has_meta = true;          ///< false: independent training, and the scene says so
@@ -41,8 +41,8 @@ struct SceneContent {
 /// A scene, in its world frame `pmeta`, is a box of this size around the origin, seen from +z. It
 /// is the same for any number of tasks, so that one rviz view fits all experiments.
 constexpr double kSceneWidth = 12;
-constexpr double kSceneHeight = 7.2;
-constexpr char kWorldFrame[] = "pmeta";
+constexpr double kSceneHeight = 7.2;     ///< see kSceneWidth
+constexpr char kWorldFrame[] = "pmeta";  ///< see kSceneWidth
 
 /// What one family of environments looks like: all tasks side by side, each in frames of its own
 /// below the world frame.
@@ -85,6 +85,7 @@ pmeta::Registry<SceneMaker>& scenes();
 ///     const RegisteredScene<CartPoleScene, pmeta::CartPoleFamily> kCartPole("cart_pole");
 template <class Drawn, class Family>
 struct RegisteredScene : pmeta::Registered<SceneMaker> {
+  /// `environment`: the family's name; throws std::logic_error if it has a scene.
   explicit RegisteredScene(const std::string& environment)
       : Registered(scenes(), environment, [](const pmeta::EnvFamily& family, int num_tasks) {
           return std::make_unique<Drawn>(dynamic_cast<const Family&>(family), num_tasks);

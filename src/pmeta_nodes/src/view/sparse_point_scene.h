@@ -10,7 +10,7 @@ namespace pmeta_nodes {
 /// the points play the episode. Beside them, maps of what both policies take the first action to be
 /// worth.
 ///
-/// Frames "task_<i>/plane" have their origins where episodes start.
+/// Frames "task_I/plane" have their origins where episodes start.
 class SparsePointScene : public LaneScene {
  public:
   static constexpr double kTimeStep = 0.2;  ///< s; the environment knows no seconds

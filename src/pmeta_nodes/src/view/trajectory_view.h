@@ -17,7 +17,7 @@ namespace pmeta_nodes {
 
 /// Draws the last episode of both policies on every task for rviz.
 ///
-/// Subscribes task_<i>/trajectory, returns and round; publishes static frames, markers (what stands
+/// Subscribes task_I/trajectory, returns and round; publishes static frames, markers (what stands
 /// still) and playback (what moves), both latched and each message whole. All is shown as of the
 /// last complete round, which agents are ahead of. Only looks on: short
 /// queues, at most ~redraw_rate pictures a second of what stands still, and nothing that moves is

@@ -10,11 +10,11 @@ namespace pmeta {
 
 /// What one step in one environment gave. It points into the rollout: valid during the call.
 struct Experience {
-  std::size_t env;           ///< which one
-  const float* observation;  ///< that was acted on
-  const double* action;
-  Step step;
-  const float* next_observation;
+  std::size_t env;                ///< which one
+  const float* observation;       ///< that was acted on
+  const double* action;           ///< as Env::step() took it
+  Step step;                      ///< reward, and whether the episode ended
+  const float* next_observation;  ///< where the step led, of a terminal state too
 };
 
 /// Acts in environments that are stepped side by side, and may remember what comes of it: as it

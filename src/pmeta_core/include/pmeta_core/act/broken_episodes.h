@@ -21,8 +21,8 @@ class BrokenEpisodes {
 
   std::int64_t count() const { return count_; }  ///< in all
 
-  void saveState(StateWriter& writer) const;
-  void loadState(StateReader& reader);
+  void saveState(StateWriter& writer) const;  ///< both counts, of those running and of all
+  void loadState(StateReader& reader);        ///< refuses more running than are forgiven
 
  private:
   int forgiven_;

@@ -11,8 +11,10 @@ namespace pmeta {
 /// Environments of one task that serve evaluation only: one for each episode.
 class Evaluation {
  public:
+  /// `envs`: at least one, all of one task.
   explicit Evaluation(std::vector<std::unique_ptr<Env>> envs);
 
+  /// Of one run(): the number of environments.
   int episodes() const { return static_cast<int>(rollout_.size()); }
 
   /// Undiscounted returns of one episode in each environment. They run in step, so that the actor

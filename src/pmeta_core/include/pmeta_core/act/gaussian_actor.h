@@ -21,10 +21,12 @@ class GaussianActor : public Actor {
   GaussianActor(const Mlp& network, std::vector<float> task_input, std::size_t max_batch, By by,
                 const float* parameters = nullptr);
 
+  /// Acts by these from now on; they must outlive that.
   void use(const float* parameters) { parameters_ = parameters; }
 
   /// May be written to, not resized.
   std::vector<float>& taskInput() { return task_input_; }
+  /// The numbers that follow the observation in each input row.
   const std::vector<float>& taskInput() const { return task_input_; }
 
   void look(const float* observations, const std::vector<std::size_t>& envs) override;

@@ -17,7 +17,8 @@ namespace pmeta {
 /// allocates nothing after construction.
 class GaussianPolicy {
  public:
-  static constexpr float kMinLogStd = -5, kMaxLogStd = 2;
+  static constexpr float kMinLogStd = -5;  ///< a standard deviation of 0.0067
+  static constexpr float kMaxLogStd = 2;   ///< a standard deviation of 7.4
 
   /// For batches of up to `max_batch` rows.
   GaussianPolicy(std::size_t action_size, std::size_t max_batch);

@@ -21,12 +21,13 @@ struct PolicyForm {
 /// All policies of one form: what their parameters are, and how they act.
 class PolicyFamily {
  public:
+  /// `layout`: of the parameters of every policy.
   explicit PolicyFamily(ModelLayout layout) : layout_(std::move(layout)) {}
   virtual ~PolicyFamily() = default;
 
-  const ModelLayout& layout() const { return layout_; }
+  const ModelLayout& layout() const { return layout_; }  ///< of the parameters of every policy
 
-  virtual PolicyForm form() const = 0;
+  virtual PolicyForm form() const = 0;  ///< activations, squashing and scaling, for policy files
 
   /// How many numbers tell a policy its task beside the observation.
   virtual std::size_t taskInputSize() const = 0;

@@ -16,6 +16,7 @@ class QActor : public Actor {
   /// `parameters` must; nullptr: to be given by use() before it acts.
   QActor(const Mlp& network, std::size_t max_batch, const float* parameters = nullptr);
 
+  /// Acts by these from now on; they must outlive that.
   void use(const float* parameters) { parameters_ = parameters; }
 
   void look(const float* observations, const std::vector<std::size_t>& envs) override;
@@ -31,10 +32,12 @@ class QActor : public Actor {
 /// Greedy policies of a network of action values (float32).
 class QPolicies : public PolicyFamily {
  public:
-  explicit QPolicies(const MlpSpec& network);
+  explicit QPolicies(const MlpSpec& network);  ///< throws Error where Mlp does
 
+  /// One input row is an observation, one output the value of an action.
   const Mlp& network() const { return network_; }
 
+  /// ReLU between layers; outputs are values as they are.
   PolicyForm form() const override { return {"relu", "none"}; }
   std::size_t taskInputSize() const override { return 0; }
   void initialise(Model& parameters, Rng& rng) const override;

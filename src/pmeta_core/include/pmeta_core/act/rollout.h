@@ -31,8 +31,8 @@ class Rollout {
 
   bool running() const { return !running_.empty(); }  ///< does any episode go on?
 
-  std::size_t size() const { return envs_.size(); }
-  const Env& env(std::size_t i) const { return *envs_[i]; }
+  std::size_t size() const { return envs_.size(); }          ///< environments
+  const Env& env(std::size_t i) const { return *envs_[i]; }  ///< in the order they were given in
   /// Where environment i is: spec().observation_size numbers.
   const double* observation(std::size_t i) const { return &observations_[i * observation_size_]; }
   /// What was done there last: spec().action_size numbers.
@@ -41,13 +41,14 @@ class Rollout {
   const Step& taken(std::size_t i) const { return steps_[i]; }
   /// Return of the episode in environment i, as policies are judged.
   double returned(std::size_t i) const { return returns_[i]; }
-  const BrokenEpisodes& broken() const { return broken_; }
-  BrokenEpisodes& broken() { return broken_; }
+  const BrokenEpisodes& broken() const { return broken_; }  ///< counts of all environments together
+  BrokenEpisodes& broken() { return broken_; }              ///< the same, to load a state into
 
   /// With kBeginAnother, in the middle of episodes: where the environments are, as floats under
   /// `observations`, and their states, each under its one of `env_names`.
   void saveEpisodes(StateWriter& writer, const std::string& observations,
                     const std::vector<std::string>& env_names) const;
+  /// Goes on from there. Throws Error where Env::loadState() does, or the sizes differ.
   void loadEpisodes(StateReader& reader, const std::string& observations,
                     const std::vector<std::string>& env_names);
 

@@ -18,6 +18,7 @@ class TablePolicies : public PolicyFamily {
   /// `env`, which says where states are in the table, must outlive the family.
   TablePolicies(const TabularEnv& env, double initial_value);
 
+  /// A table: no layers, no squashing.
   PolicyForm form() const override { return {"none", "none"}; }
   std::size_t taskInputSize() const override { return 0; }
   void initialise(Model& parameters, Rng& rng) const override;

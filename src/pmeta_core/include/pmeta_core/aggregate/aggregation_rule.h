@@ -41,6 +41,7 @@ Registry<AggregationRuleMaker>& aggregationRules();
 ///     const RegisteredRule<Mean> kMean("mean");
 template <class Rule>
 struct RegisteredRule : Registered<AggregationRuleMaker> {
+  /// `name`: for `aggregation.rule`; throws std::logic_error if it is taken.
   explicit RegisteredRule(const std::string& name)
       : Registered(aggregationRules(), name, [] { return std::make_shared<Rule>(); }) {}
 };

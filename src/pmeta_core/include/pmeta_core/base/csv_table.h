@@ -20,12 +20,15 @@ class CsvTable {
   /// The same from text; `source` names it in errors.
   static CsvTable parse(const std::string& text, const std::string& source);
 
+  /// The header's names, in the order of the file.
   const std::vector<std::string>& columns() const { return columns_; }
+  /// Lines after the header.
   std::size_t numRows() const { return cells_.size() / columns_.size(); }
 
   /// The index of the column of that name; throws Error if there is none.
   std::size_t column(const std::string& name) const;
 
+  /// A cell as it stands in the file; `row` and `column` count from 0 and must exist.
   const std::string& text(std::size_t row, std::size_t column) const;
 
   /// A cell as a finite number in `range`; throws Error if it is none.

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/base/settings.h"
+#include "pmeta_core/base/names.h"
 
 namespace pmeta {
 
@@ -30,10 +30,7 @@ class Registry {
   /// Throws Error if there is none of that name, with the known names and the nearest.
   const Row& at(const std::string& name) const {
     if (const Row* row = find(name)) return *row;
-    const std::string guess = nearest(name, names());
-    throw Error("unknown " + kind_ + " '" + name + "'" +
-                (guess.empty() ? "." : ": did you mean '" + guess + "'?") + " Known are " +
-                join(names()) + ".");
+    throw Error(unknownName(kind_, name, names()));
   }
 
   /// Null if there is none of that name.
@@ -57,6 +54,7 @@ class Registry {
 /// A row that is in a registry from the program's (or library's) start on.
 template <class Row>
 struct Registered {
+  /// Adds the row under `name`; see Registry::add().
   Registered(Registry<Row>& registry, const std::string& name, Row row) {
     registry.add(name, std::move(row));
   }

@@ -23,11 +23,13 @@ enum class Stream : std::uint64_t {
 /// standard library differ from one implementation to the next.
 class Rng {
  public:
-  using result_type = std::uint64_t;
+  using result_type = std::uint64_t;  ///< as std::uniform_random_bit_generator wants it
 
+  /// The beginning of the stream with that key.
   Rng(std::uint64_t seed, std::uint64_t task, Stream stream, std::uint64_t round = 0);
 
-  static constexpr result_type min() { return 0; }
+  static constexpr result_type min() { return 0; }  ///< least of the values of operator()
+  /// Greatest of the values of operator().
   static constexpr result_type max() { return ~std::uint64_t{0}; }
 
   /// The next 64 random bits.
@@ -44,6 +46,7 @@ class Rng {
 
   /// The four words of the state, for checkpoints and tests.
   const std::array<std::uint64_t, 4>& state() const { return state_; }
+  /// Goes on from a state(); not all four words may be 0.
   void setState(const std::array<std::uint64_t, 4>& state) { state_ = state; }
 
  private:

@@ -12,24 +12,30 @@
 #include <utility>
 #include <vector>
 
+#include "pmeta_core/base/names.h"
+
 namespace pmeta {
 
 /// Closed or open interval that a number must lie in.
 struct Range {
-  double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
-  bool low_open = false;
-  bool high_open = false;
+  double low = -std::numeric_limits<double>::infinity();  ///< none if it is infinite
+  double high = std::numeric_limits<double>::infinity();  ///< none if it is infinite
+  bool low_open = false;                                  ///< is `low` itself refused?
+  bool high_open = false;                                 ///< is `high` itself refused?
 
+  /// [low, infinity).
   static Range atLeast(double low) { return {low, std::numeric_limits<double>::infinity()}; }
+  /// (low, infinity).
   static Range above(double low) {
     return {low, std::numeric_limits<double>::infinity(), true, false};
   }
+  /// [low, high].
   static Range between(double low, double high) { return {low, high}; }
+  /// [low, high).
   static Range halfOpen(double low, double high) { return {low, high, false, true}; }
 
-  bool contains(double value) const;
-  std::string text() const;  ///< "at least 0", "from 0 to 1", "any"; for error messages
+  bool contains(double value) const;  ///< false for NaN, too
+  std::string text() const;           ///< "at least 0", "from 0 to 1", "any"; for error messages
 };
 
 /// Whether a list may be empty.
@@ -43,12 +49,17 @@ enum class Empty { kRefused, kAllowed };
 /// allowed, and for an unknown key the nearest known one. Bound variables must outlive the object.
 class Settings {
  public:
+  /// `key`: dotted, each once; `value`: the default until it is read; `doc`: a clause for the list
+  /// of settings; `range`: what is allowed.
   void bind(const std::string& key, double& value, const std::string& doc, Range range = {});
   /// -1, which `range` leaves out, stands for no value.
   void bind(const std::string& key, std::optional<double>& value, const std::string& doc,
             Range range);
+  /// A whole number.
   void bind(const std::string& key, int& value, const std::string& doc, Range range = {});
+  /// A whole number.
   void bind(const std::string& key, std::int64_t& value, const std::string& doc, Range range = {});
+  /// true or false.
   void bind(const std::string& key, bool& value, const std::string& doc);
   /// `choices`: the allowed words; empty means any text.
   void bind(const std::string& key, std::string& value, const std::string& doc,
@@ -56,8 +67,10 @@ class Settings {
   /// `range` holds for each element of a list.
   void bind(const std::string& key, std::vector<int>& value, const std::string& doc,
             Range range = {}, Empty empty = Empty::kRefused);
+  /// The same of numbers with decimals.
   void bind(const std::string& key, std::vector<double>& value, const std::string& doc,
             Range range = {}, Empty empty = Empty::kRefused);
+  /// Words, at least one; `choices` holds for each.
   void bind(const std::string& key, std::vector<std::string>& value, const std::string& doc,
             std::vector<std::string> choices = {});
 
@@ -108,14 +121,5 @@ YAML::Node parseYaml(const std::string& text, const std::string& source);
 
 /// A map of (nested) settings by full key; each value as YAML text.
 std::map<std::string, std::string> flatSettings(const YAML::Node& map);
-
-/// The candidate closest to `word` by edit distance, or "" if none is close.
-std::string nearest(const std::string& word, const std::vector<std::string>& candidates);
-
-/// Throws Error unless `value` can name a file or folder: not empty, no blanks, quotes or slashes.
-void requirePlainName(const std::string& key, const std::string& value);
-
-/// "a, b, c": words joined for messages and tables.
-std::string join(const std::vector<std::string>& words, const std::string& separator = ", ");
 
 }  // namespace pmeta

@@ -34,11 +34,13 @@ constexpr StateType stateTypeOf() {
 /// The name of the component at hand, which goes before the names of its arrays.
 class StatePath {
  protected:
+  /// The array's name with those of the components around it.
   std::string full(const std::string& name) const { return prefix_ + name; }
 
   /// The component `name` until the end of the scope.
   class Scope {
    public:
+    /// `path` must outlive it; scopes end in the reverse of their order.
     Scope(StatePath& path, const std::string& name) : path_(path), length_(path.prefix_.size()) {
       path_.prefix_ += name + "/";
     }
@@ -77,11 +79,14 @@ class StateWriter : protected StatePath {
     array(name, values.data(), values.size());
   }
 
+  /// An array of one.
   template <class T>
   void value(const std::string& name, T value) {
     array(name, &value, 1);
   }
+  /// A whole number, which StateReader::count() reads.
   void count(const std::string& name, std::int64_t count) { value(name, count); }
+  /// As 0 or 1.
   void flag(const std::string& name, bool flag) { value(name, static_cast<std::uint8_t>(flag)); }
 
   /// Text without NUL characters.
@@ -128,6 +133,7 @@ class StateReader : protected StatePath {
     array(name, values.data(), values.size());
   }
 
+  /// An array of one; a number may be NaN or infinite, see finite().
   template <class T>
   T value(const std::string& name) const {
     T value{};

@@ -12,11 +12,11 @@ namespace pmeta {
 
 /// What the reward of an ant's step is made of.
 struct AntStep {
-  double velocity_x = 0;  ///< of the torso, m/s
-  double velocity_y = 0;
-  double control_cost = 0;
-  double contact_cost = 0;
-  double survive = 0;
+  double velocity_x = 0;    ///< of the torso, m/s
+  double velocity_y = 0;    ///< of the torso, m/s
+  double control_cost = 0;  ///< 0.5 |a|^2, subtracted
+  double contact_cost = 0;  ///< 0.0005 |clip(f, -1, 1)|^2, subtracted
+  double survive = 0;       ///< added in every step: 1
 };
 
 /// Ant-Fwd-Back: a four-legged body with eight motors runs in a direction (Finn, Abbeel and Levine,
@@ -42,8 +42,8 @@ class Ant : public MujocoEnv {
   /// The reward of an ant that is to run in `direction`.
   static double reward(double direction, const AntStep& step);
 
-  double direction() const { return direction_; }
-  const AntStep& lastStep() const { return last_; }
+  double direction() const { return direction_; }    ///< the angle given to the constructor, rad
+  const AntStep& lastStep() const { return last_; }  ///< what the last step's reward was made of
 
  private:
   void drawStart(Rng& rng, double* qpos, double* qvel) override;
@@ -71,6 +71,7 @@ class AntFwdBackFamily : public EnvFamily {
   std::string taskDescription(int task) const override;
   std::unique_ptr<Env> make(int task) const override;
 
+  /// Direction of a training or test task, rad; throws std::out_of_range if there is none.
   double angle(int task) const { return tasks_.at(task); }
 
  private:

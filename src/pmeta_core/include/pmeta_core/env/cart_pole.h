@@ -25,15 +25,17 @@ struct CartPoleTask {
 /// Truncated after 200 steps. Episodes start with all four numbers uniform in [-0.05, 0.05].
 class CartPole : public Env {
  public:
+  /// A cart-pole of that force, mass and length, all positive.
   explicit CartPole(const CartPoleTask& task);
 
+  /// The four numbers with their units and limits, and the two pushes.
   const EnvSpec& spec() const override { return spec_; }
   void reset(Rng& rng, double* observation) override;
   Step step(const double* action, Rng& rng, double* observation) override;
   std::vector<double> state() const override;  ///< the four numbers, fallen (0 or 1), steps
   void setState(const std::vector<double>& state) override;
 
-  const CartPoleTask& task() const { return task_; }
+  const CartPoleTask& task() const { return task_; }  ///< as given to the constructor
 
  private:
   CartPoleTask task_;
@@ -55,6 +57,7 @@ class CartPoleFamily : public EnvFamily {
   std::string taskDescription(int task) const override;
   std::unique_ptr<Env> make(int task) const override;
 
+  /// Throws std::out_of_range if there is no such task.
   const CartPoleTask& task(int task) const { return tasks_.at(task); }
 
  private:

@@ -17,7 +17,7 @@ namespace pmeta {
 
 /// What one step gives besides the next observation.
 struct Step {
-  double reward = 0;
+  double reward = 0;        ///< what training is on
   bool terminated = false;  ///< a terminal state: nothing to bootstrap from
   bool truncated = false;   ///< the horizon was reached: the value of the state goes on
   /// Where training is on a denser reward than the task is about: the task's own, which evaluation
@@ -36,6 +36,7 @@ class BrokenEpisode : public Error {
   explicit BrokenEpisode(const std::string& reason)
       : Error(reason + "; the episode cannot go on, reset it."), reason_(reason) {}
 
+  /// As given to the constructor, for sentences that say more.
   const std::string& reason() const { return reason_; }
 
  private:
@@ -49,6 +50,7 @@ class Env {
  public:
   virtual ~Env() = default;
 
+  /// Sizes, bounds and horizon; the same for as long as the environment lives.
   virtual const EnvSpec& spec() const = 0;
 
   /// Draws a start state and writes its observation (spec().observation_size numbers). Throws
@@ -74,6 +76,7 @@ class Env {
 
   /// state() and setState(); loading refuses an episode that is over.
   void saveState(StateWriter& writer) const;
+  /// Goes on from what saveState() wrote of the same task; throws as setState() does.
   void loadState(StateReader& reader);
 };
 
@@ -134,6 +137,7 @@ Registry<EnvFamilyMaker>& envFamilies();
 ///     const RegisteredFamily<CartPoleFamily> kCartPole("cart_pole");
 template <class Family>
 struct RegisteredFamily : Registered<EnvFamilyMaker> {
+  /// `name`: for `environment.name`; throws std::logic_error if it is taken.
   explicit RegisteredFamily(const std::string& name)
       : Registered(envFamilies(), name, [] { return std::make_unique<Family>(); }) {}
 };

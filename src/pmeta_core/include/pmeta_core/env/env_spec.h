@@ -13,7 +13,7 @@ struct Quantity {
   /// Of an observation: no state in which an episode goes on lies outside (the one that ends it
   /// may). Of an action: what can be done; the environment clips what lies outside.
   double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();  ///< see low; at least that
 };
 
 /// What an agent must know of an environment before it acts.

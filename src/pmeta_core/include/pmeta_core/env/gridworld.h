@@ -11,9 +11,9 @@ namespace pmeta {
 
 /// What sets one gridworld apart.
 struct GridworldTask {
-  int size = 4;  ///< cells along each side
-  int landmark_row = 3;
-  int landmark_column = 3;
+  int size = 4;             ///< cells along each side
+  int landmark_row = 3;     ///< from 0, the upper edge
+  int landmark_column = 3;  ///< from 0, the left edge
   double slip = 0;  ///< probability that a move goes in a uniformly random direction instead
 };
 
@@ -28,6 +28,7 @@ class Gridworld : public TabularEnv {
   /// `stride`: cells along each side of the largest grid; cell (r, c) is state r * stride + c.
   Gridworld(const GridworldTask& task, int stride);
 
+  /// Row and column, and the four moves by name.
   const EnvSpec& spec() const override { return spec_; }
   void reset(Rng& rng, double* observation) override;
   Step step(const double* action, Rng& rng, double* observation) override;
@@ -36,10 +37,11 @@ class Gridworld : public TabularEnv {
 
   int numStates() const override { return stride_ * stride_; }
   const std::vector<int>& ownedStates() const override { return owned_states_; }
+  /// One outcome, or with slip one for each of the four moves; none in a state that is not owned.
   const std::vector<Outcome>& outcomes(int state, int action) const override;
-  int stateOf(const double* observation) const override;
+  int stateOf(const double* observation) const override;  ///< row * stride + column
 
-  const GridworldTask& task() const { return task_; }
+  const GridworldTask& task() const { return task_; }  ///< as given to the constructor
 
  private:
   void observe(double* observation) const;
@@ -63,7 +65,9 @@ class GridworldFamily : public EnvFamily {
   std::string taskDescription(int task) const override;
   std::unique_ptr<Env> make(int task) const override;
 
+  /// Size, landmark and slip of a task; throws std::out_of_range if there is none.
   const GridworldTask& task(int task) const { return tasks_.at(task); }
+  /// Cells along each side of the largest grid, for all tasks.
   int stride() const { return stride_; }
 
  private:

@@ -11,12 +11,13 @@ namespace pmeta {
 
 /// What sets one half-cheetah apart.
 struct HalfCheetahTask {
+  /// What the reward asks for, and what `value` means.
   enum class Goal {
     kDirection,  ///< run as fast as possible; value is +1 (forward) or -1 (backward)
     kVelocity,   ///< run at a velocity; value is in m/s
   };
-  Goal goal = Goal::kDirection;
-  double value = 1;
+  Goal goal = Goal::kDirection;  ///< of the family: all its tasks have the same
+  double value = 1;              ///< direction (1 or -1) or velocity (m/s), as `goal` says
 };
 
 /// Half-Cheetah-Dir and Half-Cheetah-Vel: a planar runner with six motors (Finn, Abbeel and Levine,
@@ -32,6 +33,7 @@ struct HalfCheetahTask {
 /// y, z as the last step left it.
 class HalfCheetah : public MujocoEnv {
  public:
+  /// Episodes are of `horizon` steps. The model must have layout(), as MujocoModel::open() sees to.
   HalfCheetah(const HalfCheetahTask& task, std::shared_ptr<const MujocoModel> model,
               int horizon = 200);
 
@@ -41,7 +43,7 @@ class HalfCheetah : public MujocoEnv {
   /// The reward of `task` at forward velocity u and control cost c.
   static double reward(const HalfCheetahTask& task, double forward_velocity, double control_cost);
 
-  const HalfCheetahTask& task() const { return task_; }
+  const HalfCheetahTask& task() const { return task_; }         ///< as given to the constructor
   double forwardVelocity() const { return forward_velocity_; }  ///< of the last step, m/s
   double controlCost() const { return control_cost_; }          ///< of the last step
 
@@ -67,6 +69,7 @@ class HalfCheetahFamily : public EnvFamily {
   std::string taskName(int task) const override;
   std::unique_ptr<Env> make(int task) const override;
 
+  /// A training or test task; throws std::out_of_range if there is none.
   const HalfCheetahTask& task(int task) const { return tasks_.at(task); }
 
  protected:
@@ -74,7 +77,7 @@ class HalfCheetahFamily : public EnvFamily {
   void build(HalfCheetahTask::Goal goal, const std::vector<double>& train,
              const std::vector<double>& test);
 
-  MujocoSettings mujoco_;
+  MujocoSettings mujoco_;  ///< bound by both families alike
 
  private:
   std::shared_ptr<const MujocoModel> model_;

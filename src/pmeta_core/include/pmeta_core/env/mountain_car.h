@@ -24,15 +24,17 @@ struct MountainCarTask {
 /// after 200 steps. Episodes start at rest, uniformly in [-0.6, -0.4].
 class MountainCar : public Env {
  public:
+  /// A car in those hills; `velocity_scale`, positive, is for observations alone.
   explicit MountainCar(const MountainCarTask& task, double velocity_scale = 1);
 
+  /// Position and scaled velocity with their bounds, and the three pushes.
   const EnvSpec& spec() const override { return spec_; }
   void reset(Rng& rng, double* observation) override;
   Step step(const double* action, Rng& rng, double* observation) override;
   std::vector<double> state() const override;  ///< position, velocity (never scaled), steps
   void setState(const std::vector<double>& state) override;
 
-  const MountainCarTask& task() const { return task_; }
+  const MountainCarTask& task() const { return task_; }  ///< as given to the constructor
 
  private:
   void observe(double* observation) const;
@@ -55,6 +57,7 @@ class MountainCarFamily : public EnvFamily {
   std::string taskDescription(int task) const override;
   std::unique_ptr<Env> make(int task) const override;
 
+  /// Throws std::out_of_range if there is no such task.
   const MountainCarTask& task(int task) const { return tasks_.at(task); }
   double velocityScale() const { return velocity_scale_; }  ///< of observations
 

@@ -13,6 +13,7 @@ namespace pmeta {
 /// the horizon truncates. A step allocates nothing.
 class MujocoEnv : public Env {
  public:
+  /// Restorable, with every number of observation and action described.
   const EnvSpec& spec() const final { return spec_; }
   void reset(Rng& rng, double* observation) final;
   Step step(const double* action, Rng& rng, double* observation) final;
@@ -25,6 +26,7 @@ class MujocoEnv : public Env {
 
   const MujocoModel* model() const final { return &simulation_.model(); }
 
+  /// The body as the last step left it.
   const MujocoSimulation& simulation() const { return simulation_; }
 
  protected:
@@ -34,6 +36,7 @@ class MujocoEnv : public Env {
 
   /// The layout's hinges from number `first` on, and how fast they turn.
   static std::vector<Quantity> jointAngles(const MujocoLayout& layout, std::size_t first);
+  /// Angular velocities (rad/s) of the layout's hinges from number `first` on.
   static std::vector<Quantity> jointVelocities(const MujocoLayout& layout, std::size_t first);
 
   /// All parts, one after the other.
@@ -42,8 +45,8 @@ class MujocoEnv : public Env {
   /// The sum of the squares of the last step's control.
   double squaredControl() const;
 
-  MujocoSimulation simulation_;
-  const double* torso_;  ///< its position, as the last step left it
+  MujocoSimulation simulation_;  ///< of this environment alone; the model may be shared
+  const double* torso_;          ///< its position, as the last step left it
 
  private:
   /// Draws a start: configuration and velocity hold the model's rest when this is called.
@@ -64,10 +67,10 @@ class MujocoEnv : public Env {
 
 /// Settings of the families of such environments.
 struct MujocoSettings {
-  ModelChoice model;
-  int horizon = 200;
+  ModelChoice model;  ///< the shipped one unless `environment.model_file` names another
+  int horizon = 200;  ///< steps of an episode
 
-  void bind(Settings& settings);
+  void bind(Settings& settings);  ///< binds them below "environment."
 
   /// The chosen model, whose hash is then known. Throws Error if it is not of the hash that the
   /// settings give; see also MujocoModel::require().

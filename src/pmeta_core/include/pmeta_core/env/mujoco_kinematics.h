@@ -13,6 +13,7 @@ namespace pmeta {
 
 /// What one geom of a body looks like.
 struct GeomShape {
+  /// What stands for a geom in drawings, and what its size means.
   enum class Type {
     kSphere,     ///< size: radius
     kCapsule,    ///< size: radius, half length of the cylinder, along z
@@ -20,7 +21,7 @@ struct GeomShape {
     kCylinder,   ///< size: radius, half length, along z
     kBox,        ///< size: half sides; also of a mesh, as far as it reaches from its middle
   };
-  Type type = Type::kSphere;
+  Type type = Type::kSphere;     ///< tells how to read `size`
   std::string name;              ///< "" if it has none
   std::array<double, 3> size{};  ///< m
   std::array<double, 3> rgb{};   ///< of its material, or its own; 0 to 1
@@ -34,6 +35,7 @@ class MujocoKinematics {
   /// fields, and meshes of bodies that have other geoms, which stand for them in collisions.
   explicit MujocoKinematics(const MujocoModel& model);
 
+  /// In the order of the model's geoms.
   const std::vector<GeomShape>& shapes() const { return shapes_; }
   int nq() const;  ///< numbers in a configuration
 
@@ -46,7 +48,7 @@ class MujocoKinematics {
   /// Centre (m) of shape `index` and its orientation (3 x 3, row-major), world axes, in the last
   /// pose().
   const double* position(std::size_t index) const;
-  const double* rotation(std::size_t index) const;
+  const double* rotation(std::size_t index) const;  ///< see position()
 
   /// Origin (m) of a body's frame, world axes, in the last pose(); see MujocoModel::body().
   const double* bodyPosition(int body) const;

@@ -41,9 +41,11 @@ class MujocoModel {
   /// motors of `layout`, motors that take controls from -1 to 1, and no other state.
   void require(const MujocoLayout& layout) const;
 
+  /// MuJoCo's own structure, which lives as long as this.
   const mjModel_* get() const { return model_.get(); }
+  /// The same, to be written to before the model is shared.
   mjModel_* get() { return model_.get(); }
-  const std::string& source() const { return source_; }
+  const std::string& source() const { return source_; }  ///< where it was read from, for errors
 
   /// The index of the body of that name; throws Error if there is none.
   int body(const std::string& name) const;

@@ -20,17 +20,18 @@ class MujocoSimulation {
   MujocoSimulation(std::shared_ptr<const MujocoModel> model, std::string environment,
                    int frame_skip);
 
-  const MujocoModel& model() const { return *model_; }
-  int nq() const { return nq_; }
+  const MujocoModel& model() const { return *model_; }  ///< what is simulated; never changed by it
+  int nq() const { return nq_; }                        ///< numbers in a configuration
+  /// Numbers in a velocity; fewer than nq() where there are quaternions.
   int nv() const { return nv_; }
-  int nu() const { return nu_; }
+  int nu() const { return nu_; }     ///< numbers in an action
   int numBodies() const;             ///< the world included
   double dt() const { return dt_; }  ///< seconds that a step takes
 
-  double* qpos() { return qpos_; }  ///< configuration, nq
-  const double* qpos() const { return qpos_; }
-  double* qvel() { return qvel_; }  ///< velocity, nv
-  const double* qvel() const { return qvel_; }
+  double* qpos() { return qpos_; }                    ///< configuration, nq
+  const double* qpos() const { return qpos_; }        ///< the same, to be read only
+  double* qvel() { return qvel_; }                    ///< velocity, nv
+  const double* qvel() const { return qvel_; }        ///< the same, to be read only
   const double* control() const { return control_; }  ///< of the last step, clipped, nu
 
   /// The origin of a body's frame (m), world axes; always at the same address. After a step it is

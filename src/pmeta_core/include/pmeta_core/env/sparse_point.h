@@ -10,8 +10,8 @@ namespace pmeta {
 
 /// What sets one point robot apart: where it is to go.
 struct SparsePointTask {
-  double goal_x = 1;
-  double goal_y = 0;
+  double goal_x = 1;  ///< on the unit half circle where the family makes it
+  double goal_y = 0;  ///< at least 0 where the family makes it
 };
 
 /// Sparse-Point-Robot: a point in the plane goes to a goal that it sees only in its reward (Rakelly
@@ -23,15 +23,16 @@ struct SparsePointTask {
 /// Episodes start at the origin.
 class SparsePoint : public Env {
  public:
+  /// `goal_radius`: within which the sparse reward is not 0; `horizon`: steps of an episode.
   explicit SparsePoint(const SparsePointTask& task, double goal_radius = 0.2, int horizon = 20);
 
-  const EnvSpec& spec() const override { return spec_; }
+  const EnvSpec& spec() const override { return spec_; }  ///< position and move, with bounds
   void reset(Rng& rng, double* observation) override;
   Step step(const double* action, Rng& rng, double* observation) override;
   std::vector<double> state() const override;  ///< x, y, steps
   void setState(const std::vector<double>& state) override;
 
-  const SparsePointTask& task() const { return task_; }
+  const SparsePointTask& task() const { return task_; }  ///< as given to the constructor
 
  private:
   SparsePointTask task_;
@@ -54,7 +55,9 @@ class SparsePointFamily : public EnvFamily {
   std::string taskDescription(int task) const override;
   std::unique_ptr<Env> make(int task) const override;
 
+  /// Goal of a training or test task; throws std::out_of_range if there is none.
   const SparsePointTask& task(int task) const { return tasks_.at(task).goal; }
+  /// Of all tasks: distance within which the sparse reward is not 0.
   double goalRadius() const { return goal_radius_; }
 
  private:

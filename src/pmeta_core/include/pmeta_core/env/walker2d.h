@@ -43,6 +43,7 @@ std::string describeWalker2dModel(const MujocoModel& model, const MujocoModel& b
 /// velocities (x, z, pitch, joints) clipped to [-10, 10].
 class Walker2d : public MujocoEnv {
  public:
+  /// Episodes are of `horizon` steps. The model must have layout(), as MujocoModel::open() sees to.
   explicit Walker2d(std::shared_ptr<const MujocoModel> model, int horizon = 200);
 
   /// What the model must have; its shipped name is "walker2d".
@@ -50,7 +51,7 @@ class Walker2d : public MujocoEnv {
 
   double forwardVelocity() const { return forward_velocity_; }  ///< of the last step, m/s
   double controlCost() const { return control_cost_; }          ///< of the last step
-  static double aliveBonus() { return 1; }
+  static double aliveBonus() { return 1; }  ///< what the reward adds in every step
 
  private:
   void drawStart(Rng& rng, double* qpos, double* qvel) override;
@@ -79,6 +80,7 @@ class Walker2dParamsFamily : public EnvFamily {
   std::string taskDescription(int task) const override;
   std::unique_ptr<Env> make(int task) const override;
 
+  /// Factors of a training or test task; throws std::out_of_range if there is none.
   const Walker2dTask& task(int task) const { return tasks_.at(task).factors; }
 
  private:

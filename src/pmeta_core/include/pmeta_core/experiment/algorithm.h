@@ -18,9 +18,9 @@ enum class Sent {
 /// How agents and meta-aggregator work together: the algorithms are settings of one run, not code
 /// paths of their own.
 struct Algorithm {
-  std::string label;    ///< for figures and tables, e.g. "pMeta-RL"
-  std::string meaning;  ///< a clause, for the list of settings
-  Sent sent = Sent::kPersonal;
+  std::string label;            ///< for figures and tables, e.g. "pMeta-RL"
+  std::string meaning;          ///< a clause, for the list of settings
+  Sent sent = Sent::kPersonal;  ///< omega only where there is a pull that makes it another than phi
   /// Are the personal parameters pulled towards the auxiliary ones? If not, lambda is 0.
   bool pulls = false;
   /// Does the aggregate come back as each round's start? If not, agents keep what they have, beta

@@ -48,21 +48,27 @@ class Experiment {
                            const std::vector<std::string>& overrides = {},
                            const std::string& of_config = "");
 
+  /// Checked, with paths absolute and names filled in.
   const ExperimentSettings& settings() const { return settings_; }
-  const LearnerKind& learner() const { return *learner_; }
-  const EnvFamily& family() const { return *family_; }
-  int numTasks() const { return family_->numTasks(); }  ///< that are trained on
+  const LearnerKind& learner() const { return *learner_; }  ///< with its settings
+  const EnvFamily& family() const { return *family_; }      ///< built
+  int numTasks() const { return family_->numTasks(); }      ///< that are trained on
   int numTestTasks() const;  ///< that only the meta-policy is evaluated on, numbered after those
-  int totalTasks() const { return numTasks() + numTestTasks(); }
+  int totalTasks() const { return numTasks() + numTestTasks(); }  ///< training and test tasks
+  /// Test tasks are numbered after the training tasks.
   bool isTestTask(int task) const { return task >= numTasks(); }
 
-  const Algorithm& algorithm() const { return *algorithm_; }
+  const Algorithm& algorithm() const { return *algorithm_; }  ///< the row that `algorithm` names
+  /// Is there a meta-policy that anybody acts on?
   bool evaluatesMeta() const { return algorithm_->shares; }
+  /// Does phi go on where the last round left it, instead of at the meta-policy?
   bool keepsPersonal() const { return settings_.personal.personal_init == "keep"; }
+  /// The rounds that `evaluation_interval` chooses.
   EvaluationSchedule evaluationSchedule() const {
     return {settings_.evaluation_interval, settings_.rounds};
   }
   int quorum() const;  ///< updates needed once the deadline has passed
+  /// The rule that `aggregation.rule` names, with its settings.
   std::shared_ptr<const AggregationRule> rule() const {
     return rules_.at(settings_.aggregation.rule);
   }
@@ -83,7 +89,7 @@ class Experiment {
     return settings_.checkpoint_interval > 0 && round % settings_.checkpoint_interval == 0;
   }
 
-  /// <results_dir>/<experiment>/<run_id>
+  /// RESULTS_DIR/EXPERIMENT/RUN_ID
   std::string runDir() const;
 
   /// The effective settings as YAML; parse() of it gives the same experiment.

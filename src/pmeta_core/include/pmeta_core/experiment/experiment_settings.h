@@ -20,34 +20,36 @@ struct AggregationSettings {
 
 /// The rounds in which policies are evaluated: every `interval`-th, and the last.
 struct EvaluationSchedule {
-  int interval = 1;
-  int rounds = 1;  ///< C
+  int interval = 1;  ///< at least 1
+  int rounds = 1;    ///< C
 
+  /// `round`: from 1.
   bool includes(int round) const { return round % interval == 0 || round == rounds; }
 };
 
 /// Everything that defines a run, with defaults.
 struct ExperimentSettings {
-  std::string experiment = "experiment";
-  std::string preset;                  ///< which of the file's presets; "" for none
+  std::string experiment = "experiment";  ///< names the set and its results folder
+  std::string preset;                     ///< which of the file's presets; "" for none
   std::string library;                 ///< shared library with rows of the user's own; "" for none
   std::string algorithm = "pmeta";     ///< a name of algorithms()
   std::string learner = "q_learning";  ///< a name of learners()
   std::string arithmetic = "native";   ///< of networks: native or portable
-  std::int64_t seed = 0;
-  int rounds = 10;              ///< C
-  int updates_per_round = 3;    ///< R
-  int evaluation_interval = 1;  ///< rounds from one evaluation to the next
-  std::string results_dir;      ///< "" means $ROS_HOME/pmeta, by default ~/.ros/pmeta
-  std::string run_id;           ///< "" means one made of the start time, algorithm and seed
-  double pace = 0;              ///< least seconds between rounds, to watch a fast experiment
+  std::int64_t seed = 0;               ///< of all random draws: one seed, one result
+  int rounds = 10;                     ///< C
+  int updates_per_round = 3;           ///< R
+  int evaluation_interval = 1;         ///< rounds from one evaluation to the next
+  std::string results_dir;             ///< "" means $ROS_HOME/pmeta, by default ~/.ros/pmeta
+  std::string run_id;                  ///< "" means one made of the start time, algorithm and seed
+  double pace = 0;                     ///< least seconds between rounds, to watch a fast experiment
+  /// Do agents send one evaluation episode of each policy a round, to be looked at?
   bool publish_trajectories = true;
   int checkpoint_interval = 0;  ///< rounds from one checkpoint to the next; 0: none
   std::string key_file;         ///< of the key that messages are authenticated with; "" for none
   int fresh_episodes = 0;       ///< local runner: episodes of the evaluation after the last round
-  PersonalSettings personal;
-  AggregationSettings aggregation;
-  std::string environment = "gridworld";
+  PersonalSettings personal;    ///< step sizes and pull
+  AggregationSettings aggregation;        ///< mixing and waiting
+  std::string environment = "gridworld";  ///< a name of envFamilies()
 };
 
 }  // namespace pmeta

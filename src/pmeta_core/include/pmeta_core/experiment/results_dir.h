@@ -16,6 +16,6 @@ void requireWritable(const std::string& dir);
 
 /// UTC time as 20261122T061203, for names; or 2026-11-22T06:12:03Z, for people.
 std::string utcStamp();
-std::string utcTime();
+std::string utcTime();  ///< the same time as 2026-11-22T06:12:03Z, for people
 
 }  // namespace pmeta

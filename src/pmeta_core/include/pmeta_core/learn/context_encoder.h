@@ -46,8 +46,8 @@ void bind(Settings& settings, const std::string& prefix, ContextSettings& contex
 
 /// q(z|c), a diagonal Gaussian; [latent_size] each.
 struct LatentPosterior {
-  std::vector<double> mean;
-  std::vector<double> variance;
+  std::vector<double> mean;      ///< 0 each for the prior
+  std::vector<double> variance;  ///< 1 each for the prior
 };
 
 /// Sum over dimensions of KL(q || N(0, I)) = (variance + mean^2 - 1 - log variance) / 2.
@@ -67,20 +67,23 @@ class ContextEncoder {
  public:
   /// Room for one pass over up to `max_rows` rows.
   struct Workspace {
+    /// For up to `max_rows` (at least 1) rows of that encoder, which must outlive it.
     Workspace(const ContextEncoder& encoder, std::size_t max_rows);
 
-    MlpWorkspace mlp;
-    AlignedFloats heads;            // of the last pass, [rows, 2 * latent_size]
-    AlignedFloats d_heads;          // [rows, 2 * latent_size]
-    std::vector<double> precision;  // sum_i 1 / s_i^2
-    std::vector<double> weighted;   // sum_i mu_i / s_i^2
+    MlpWorkspace mlp;  ///< activations of the last pass
+    /// Of the last pass, [rows, 2 * latent_size]: means, then variances before softplus.
+    AlignedFloats heads;
+    AlignedFloats d_heads;          ///< gradient by the heads, [rows, 2 * latent_size]
+    std::vector<double> precision;  ///< sum_i 1 / s_i^2, [latent_size]
+    std::vector<double> weighted;   ///< sum_i mu_i / s_i^2, [latent_size]
   };
 
+  /// Both sizes as EnvSpec has them. Throws Error where Mlp does.
   ContextEncoder(int observation_size, int action_size, const ContextSettings& settings);
 
-  const Mlp& network() const { return network_; }
-  std::size_t latentSize() const { return latent_size_; }
-  std::size_t rowSize() const { return network_.inputs(); }
+  const Mlp& network() const { return network_; }  ///< rowSize() inputs, 2 * latentSize() outputs
+  std::size_t latentSize() const { return latent_size_; }    ///< numbers of z
+  std::size_t rowSize() const { return network_.inputs(); }  ///< numbers of a context row
 
   /// Writes a context row of rowSize() floats.
   void writeRow(const Transition& transition, float* row) const;

@@ -10,14 +10,15 @@ namespace pmeta {
 
 /// A context and the z drawn from its posterior: a task as it was inferred once.
 struct InferredTask {
+  /// Room for one context of settings.batch_size rows.
   explicit InferredTask(const ContextEncoder& encoder, const ContextSettings& settings);
 
-  AlignedFloats rows;  // [batch_size, rowSize()]
-  ContextEncoder::Workspace workspace;
-  LatentPosterior posterior;
-  std::vector<double> noise;
-  std::vector<float> z;
-  std::vector<float> d_z;  // gradient by z, for whoever trains the encoder
+  AlignedFloats rows;                   ///< the context, [batch_size, rowSize()]
+  ContextEncoder::Workspace workspace;  ///< as infer() left it, for backward()
+  LatentPosterior posterior;            ///< q(z|c) of these rows
+  std::vector<double> noise;            ///< that z was drawn with, [latent_size]
+  std::vector<float> z;                 ///< mean + sqrt(variance) * noise, [latent_size]
+  std::vector<float> d_z;               ///< gradient by z, for whoever trains the encoder
 };
 
 /// Transitions of one task from which its z is inferred: the most recent ones.
@@ -27,8 +28,9 @@ class ContextStore {
   ContextStore(const ContextEncoder& encoder, const ContextSettings& settings, int observation_size,
                int action_size);
 
+  /// Keeps it in the place of the oldest once settings.buffer_size are kept.
   void add(const Transition& transition) { kept_.add(transition); }
-  const ReplayBuffer& kept() const { return kept_; }
+  const ReplayBuffer& kept() const { return kept_; }  ///< what contexts are drawn from
 
   /// Draws a context from what is kept, settings.window transitions in a row of it if that is not
   /// 0, and z by the encoder at `parameters`. Throws nothing, allocates nothing.
@@ -37,7 +39,9 @@ class ContextStore {
   /// q(z|c) by all that is kept.
   LatentPosterior posterior(const float* parameters) const;
 
+  /// The transitions; settings and encoder are not part of it.
   void saveState(StateWriter& writer) const { kept_.saveState(writer); }
+  /// Throws Error where ReplayBuffer does.
   void loadState(StateReader& reader) { kept_.loadState(reader); }
 
  private:

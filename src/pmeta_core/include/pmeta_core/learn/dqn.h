@@ -26,6 +26,7 @@ class DqnLearner : public Learner, private Actor {
   DqnLearner(std::vector<std::unique_ptr<Env>> envs, const DqnSettings& settings,
              std::int64_t total_updates);
 
+  /// The network of action values, whose parameters are learnt.
   const Mlp& network() const { return policies_.network(); }
 
   /// Makes every target network a copy of `parameters`; to be called before the first update.
@@ -50,13 +51,18 @@ class DqnLearner : public Learner, private Actor {
   void addValues(const Model&, const std::vector<float>&, Episode&) const override {}
 
   std::int64_t updates() const { return update_.updates(); }  ///< calls of update() so far
+  /// Exploration rate of the next update.
   double epsilon() const { return schedule_.at(updates()); }
+  /// Transitions of n steps, warm-up included.
   const PrioritisedReplay& replay() const { return replay_; }
+  /// Parameters of the target networks, one by one.
   const AlignedFloats& targets() const { return update_.targets(); }
-  std::size_t numEnvs() const { return rollout_.size(); }
+  std::size_t numEnvs() const { return rollout_.size(); }  ///< stepped side by side
+  /// One of those, as training has left it.
   const Env& env(std::size_t i) const { return rollout_.env(i); }
 
   void saveState(StateWriter& writer) const override;
+  /// Refuses what is no action of this task, and an empty replay after the warm-up.
   void loadState(StateReader& reader) override;
 
  private:

@@ -39,8 +39,8 @@ class DqnUpdate {
   const AlignedFloats& targets() const { return targets_; }  ///< of the K networks, one by one
   std::int64_t updates() const { return updates_; }          ///< calls of apply() so far
 
-  void saveState(StateWriter& writer) const;
-  void loadState(StateReader& reader);
+  void saveState(StateWriter& writer) const;  ///< target networks and the count of updates
+  void loadState(StateReader& reader);        ///< refuses targets of another size or number
 
  private:
   void computeTargets(const float* parameters, const ReplayBatch& batch);

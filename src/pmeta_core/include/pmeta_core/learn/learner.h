@@ -7,6 +7,7 @@
 
 #include "pmeta_core/act/episode.h"
 #include "pmeta_core/act/policy_family.h"
+#include "pmeta_core/learn/loss.h"
 #include "pmeta_core/learn/optimizer.h"
 
 namespace pmeta {
@@ -20,12 +21,6 @@ struct UpdateStats {
   std::int64_t updates = 0;          ///< updates of the parameters
   std::int64_t broken_episodes = 0;  ///< whose simulation broke down
   double loss = 0;                   ///< the first of Learner::losses()
-};
-
-/// A measure of an update, by its name for people.
-struct Loss {
-  const char* name;
-  double value;
 };
 
 /// What learns one task from its environments: an update rule and the data that it collects. The
@@ -51,7 +46,7 @@ class Learner {
   /// call.
   virtual UpdateStats learn(const Model& parameters, const AnyOptimizer& optimizer, Rng& rng) = 0;
 
-  /// Of the last update; the first is its own measure of success.
+  /// Of the last update, always the same names; the first is its own measure of success.
   virtual const std::vector<Loss>& losses() const = 0;
 
   /// What tells `policy` the task beside the observations, as far as this learner knows.
@@ -66,6 +61,8 @@ class Learner {
 
   /// All but parameters and optimiser that later updates depend on.
   virtual void saveState(StateWriter& writer) const = 0;
+  /// Goes on from what a learner of the same settings and task has saved; throws Error on anything
+  /// else.
   virtual void loadState(StateReader& reader) = 0;
 };
 

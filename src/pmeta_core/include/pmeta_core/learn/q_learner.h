@@ -20,7 +20,7 @@ class QLearner {
   /// `env` must outlive the learner. gamma: discount in [0, 1).
   QLearner(const TabularEnv& env, double gamma);
 
-  /// One personalised update's samples: round(samples_per_entry * #owned states * #actions)
+  /// One personalised update's samples: round(samples_per_entry * owned states * actions)
   /// (at least one) transitions (s,a,r,s'), (s,a) uniform over the owned entries; each at once, in
   /// place, hands the gradient Q(s,a) - [r + gamma max Q(s',.)] of its entry to `optimizer`, which
   /// moves `q`.

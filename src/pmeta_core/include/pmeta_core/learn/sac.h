@@ -51,20 +51,28 @@ class SacLearner : public Learner {
   void addValues(const Model& policy, const std::vector<float>& task_input,
                  Episode& episode) const override;
 
+  /// What the parameters are of.
   const SacNetworks& networks() const { return policies_.networks(); }
-  const SacSettings& settings() const { return settings_; }
+  const SacSettings& settings() const { return settings_; }  ///< as given to the constructor
   const std::vector<float>& taskInput() const { return collector_.taskInput(); }  ///< while acting
+  /// The weight of the entropy, as the last update left it.
   const Temperature& temperature() const { return update_.temperature(); }
+  /// Parameters of target critic 1, then of 2.
   const AlignedFloats& targets() const { return update_.targets(); }
+  /// Transitions, warm-up included.
   const ReplayBuffer& replay() const { return collector_.replay(); }
-  const ContextStore& context() const { return *context_; }  ///< only with an encoder
-  std::int64_t updates() const { return update_.updates(); }
+  const ContextStore& context() const { return *context_; }   ///< only with an encoder
+  std::int64_t updates() const { return update_.updates(); }  ///< calls of update() so far
+  /// Training episodes so far whose simulation broke down.
   std::int64_t brokenEpisodes() const { return collector_.brokenEpisodes(); }
 
   void saveState(StateWriter& writer) const override;
+  /// Refuses an empty replay or context after the start, and another task's input.
   void loadState(StateReader& reader) override;
 
  private:
+  void report(const SacLosses& losses);
+
   SacSettings settings_;
   SacPolicies policies_;
   std::optional<ContextStore> context_;

@@ -35,12 +35,16 @@ class SacCollector : private Actor {
   /// Returns the transitions made. Allocates nothing once the buffers are full.
   std::int64_t collect(const float* parameters, Rng& rng, const float* explorer);
 
+  /// Transitions, warm-up included; empty before the first collect().
   const ReplayBuffer& replay() const { return replay_; }
   const std::vector<float>& taskInput() const { return acting_.taskInput(); }  ///< while acting
-  const Env& env() const { return rollout_.env(0); }
+  const Env& env() const { return rollout_.env(0); }  ///< as the last step has left it
+  /// Episodes so far whose simulation broke down.
   std::int64_t brokenEpisodes() const { return rollout_.broken().count(); }
 
+  /// Replay, counts and the episode at hand; the context is its store's.
   void saveState(StateWriter& writer) const;
+  /// Refuses an empty replay after the start, and another task's input.
   void loadState(StateReader& reader);
 
  private:

@@ -28,20 +28,22 @@ class SacNetworks {
   /// Error if actions are discrete or there is no task to encode.
   SacNetworks(const EnvSpec& env, const SacSettings& settings, int num_tasks);
 
-  const Mlp& actor() const { return actor_; }
+  const Mlp& actor() const { return actor_; }  ///< its outputs are the heads of a GaussianPolicy
   const Mlp& critic(int k) const { return k == 0 ? critic1_ : critic2_; }  ///< k: 0 or 1
-  bool hasEncoder() const { return encoder_.has_value(); }
+  bool hasEncoder() const { return encoder_.has_value(); }     ///< with task_encoding "inference"
   const ContextEncoder& encoder() const { return *encoder_; }  ///< only where hasEncoder()
 
-  // where each one's parameters begin; the actor's are the first
+  /// Where critic k (0 or 1) begins; the actor is the first.
   std::size_t criticOffset(int k) const { return actor_.size() + (k == 0 ? 0 : critic1_.size()); }
+  /// After both critics, whether there is an encoder or not.
   std::size_t encoderOffset() const { return criticOffset(1) + critic2_.size(); }
   std::size_t size() const;           ///< number of all parameters
   std::vector<Block> blocks() const;  ///< of all, in order
 
-  std::size_t observationSize() const { return observation_size_; }
+  std::size_t observationSize() const { return observation_size_; }  ///< numbers of an observation
+  /// Length of the one-hot vector or of z; 0 without either.
   std::size_t taskInputSize() const { return task_input_size_; }
-  std::size_t actionSize() const { return action_size_; }
+  std::size_t actionSize() const { return action_size_; }  ///< numbers of an action
 
   /// Each network as Mlp::initialise() does.
   void initialise(float* parameters, Rng& rng) const;
@@ -60,8 +62,10 @@ class SacPolicies : public PolicyFamily {
   /// As SacNetworks.
   SacPolicies(const EnvSpec& env, const SacSettings& settings, int num_tasks);
 
+  /// All of them, also the encoder, which does not act itself.
   const SacNetworks& networks() const { return networks_; }
 
+  /// ReLU between layers; means squashed by tanh.
   PolicyForm form() const override { return {"relu", "tanh"}; }
   std::size_t taskInputSize() const override { return networks_.taskInputSize(); }
   void initialise(Model& parameters, Rng& rng) const override;

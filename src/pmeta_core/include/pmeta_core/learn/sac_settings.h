@@ -19,7 +19,7 @@ struct SacSettings {
   double reward_scale = 1;               ///< factor on rewards in the critics' target
   int warm_up_steps = 1000;              ///< uniformly random steps before the first update
   int env_steps_per_update = 1;          ///< environment steps before each update
-  TemperatureSettings temperature;
+  TemperatureSettings temperature;       ///< weight of the entropy
   /// What tells the networks the task besides the observation: "inference" (a latent vector that
   /// the context encoder infers), "one_hot" (the task's number), or "none".
   std::string task_encoding = "one_hot";

@@ -52,7 +52,7 @@ class SacUpdate {
   /// encoder.
   std::vector<InferredTask>& tasks() { return tasks_; }
 
-  std::size_t batch() const { return batch_; }
+  std::size_t batch() const { return batch_; }  ///< transitions of an update
 
   /// Takes the transition as the row-th of the batch.
   void put(std::size_t row, const Transition& transition);
@@ -62,12 +62,13 @@ class SacUpdate {
   /// nothing.
   SacLosses apply(const float* parameters, Optimizer<float>& optimizer, Rng& rng);
 
-  const Temperature& temperature() const { return temperature_; }
-  const AlignedFloats& targets() const { return targets_; }  ///< critic 1's, then critic 2's
-  std::int64_t updates() const { return updates_; }          ///< calls of apply() so far
+  const Temperature& temperature() const { return temperature_; }  ///< as the last update left it
+  const AlignedFloats& targets() const { return targets_; }        ///< critic 1's, then critic 2's
+  std::int64_t updates() const { return updates_; }                ///< calls of apply() so far
 
   /// Targets, temperature and count.
   void saveState(StateWriter& writer) const;
+  /// Refuses targets of another size, and a temperature that is not finite.
   void loadState(StateReader& reader);
 
  private:

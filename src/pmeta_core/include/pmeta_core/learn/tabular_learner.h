@@ -25,6 +25,7 @@ void bind(Settings& settings, const std::string& prefix, QLearningSettings& q_le
 /// Q-learning on the table that tasks with a known model share: its task's entries are present.
 class TabularLearner : public Learner {
  public:
+  /// `env`: of the task, whose owned entries are learnt.
   TabularLearner(std::unique_ptr<TabularEnv> env, const QLearningSettings& settings);
 
   const PolicyFamily& policies() const override { return policies_; }
@@ -42,7 +43,7 @@ class TabularLearner : public Learner {
                  Episode& episode) const override;
   /// What a later update depends on are the parameters alone.
   void saveState(StateWriter&) const override {}
-  void loadState(StateReader&) override {}
+  void loadState(StateReader&) override {}  ///< nothing to read
 
  private:
   std::unique_ptr<TabularEnv> env_;

@@ -27,10 +27,11 @@ void bind(Settings& settings, const std::string& prefix, TemperatureSettings& te
 /// Actor-Critic Algorithms and Applications", 2018, eq. 18, by log alpha).
 class Temperature {
  public:
+  /// `action_size`: components of an action, for the default target entropy.
   Temperature(const TemperatureSettings& settings, int action_size);
 
-  double value() const;  ///< alpha
-  double targetEntropy() const { return target_entropy_; }
+  double value() const;                                     ///< alpha
+  double targetEntropy() const { return target_entropy_; }  ///< in nats
 
   /// Derivative of the loss by log alpha.
   double gradient(double mean_log_prob) const { return -(mean_log_prob + target_entropy_); }
@@ -38,8 +39,9 @@ class Temperature {
   /// One step of Adam, given the mean of log pi over a batch; nothing where alpha is fixed.
   void update(double mean_log_prob);
 
+  /// Log alpha, Adam's moments and the count of updates.
   void saveState(StateWriter& writer) const;
-  void loadState(StateReader& reader);
+  void loadState(StateReader& reader);  ///< refuses what is not finite
 
  private:
   bool automatic_;

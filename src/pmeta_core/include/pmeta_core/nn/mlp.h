@@ -31,7 +31,7 @@ class MlpWorkspace {
   /// For batches of up to `max_batch` (at least 1) rows.
   MlpWorkspace(const Mlp& mlp, std::size_t max_batch);
 
-  std::size_t maxBatch() const { return max_batch_; }
+  std::size_t maxBatch() const { return max_batch_; }  ///< rows that it has room for
 
  private:
   friend class Mlp;
@@ -54,10 +54,10 @@ class Mlp {
   /// Throws Error unless every size is positive and the prefix a name.
   explicit Mlp(MlpSpec spec);
 
-  const MlpSpec& spec() const { return spec_; }
-  std::size_t inputs() const { return spec_.inputs; }
-  std::size_t outputs() const { return spec_.outputs; }
-  std::size_t size() const { return size_; }  ///< number of parameters
+  const MlpSpec& spec() const { return spec_; }          ///< as given to the constructor
+  std::size_t inputs() const { return spec_.inputs; }    ///< length of an input row
+  std::size_t outputs() const { return spec_.outputs; }  ///< length of an output row
+  std::size_t size() const { return size_; }             ///< number of parameters
 
   /// Names and shapes of the parameters in their order, for a ModelLayout of Precision::kFloat32.
   const std::vector<Block>& blocks() const { return blocks_; }

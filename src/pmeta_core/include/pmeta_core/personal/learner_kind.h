@@ -16,13 +16,14 @@ namespace pmeta {
 
 /// What a learner is made for: a task of an experiment.
 struct LearnerTask {
-  std::shared_ptr<const EnvFamily> family;
-  int task = 0;
-  bool trains = true;              ///< false: a test task, on which nothing is learnt
+  std::shared_ptr<const EnvFamily> family;  ///< built; kept alive by whoever holds this
+  int task = 0;                             ///< a training or test task of the family
+  bool trains = true;                       ///< false: a test task, on which nothing is learnt
   bool shares = true;              ///< does each round begin with what comes back of all tasks?
   bool pools = false;              ///< does it train in environments of all tasks?
   std::int64_t total_updates = 0;  ///< of the whole run
 
+  /// A new environment of the task.
   std::unique_ptr<Env> makeEnv() const { return family->make(task); }
 };
 
@@ -39,6 +40,7 @@ class LearnerKind {
 
   /// Has it networks? Then their matrix products may be asked to be the same on every processor.
   virtual bool hasNetworks() const = 0;
+  /// Asks for that, or no longer; does nothing where there are no networks.
   virtual void setPortable(bool portable) = 0;
 
   /// The discount of a tabular update, which is a linear map of the parameters; nothing for
@@ -72,7 +74,7 @@ class LearnerKind {
 struct LearnerRow {
   std::string meaning;   ///< a clause, for the list of settings
   std::string policies;  ///< what policy files hold, for scripts: see manifest.h
-  std::function<std::unique_ptr<LearnerKind>()> make;
+  std::function<std::unique_ptr<LearnerKind>()> make;  ///< with default settings
 };
 
 /// Every kind of learner, by the name that `learner` gives.
@@ -83,6 +85,7 @@ Registry<LearnerRow>& learners();
 ///     const RegisteredLearner<DqnKind> kDqn("dqn", "for networks", "q_network");
 template <class Kind>
 struct RegisteredLearner : Registered<LearnerRow> {
+  /// The columns of a LearnerRow; throws std::logic_error if the name is taken.
   RegisteredLearner(const std::string& name, const std::string& meaning,
                     const std::string& policies)
       : Registered(learners(), name, {meaning, policies, [] { return std::make_unique<Kind>(); }}) {

@@ -19,14 +19,14 @@ namespace pmeta {
 
 /// Return of a policy that was given some exploration episodes to find out about the task.
 struct AdaptedReturn {
-  int context_episodes = 0;  ///< how many; 0: before any
-  ReturnStats stats;
+  int context_episodes = 0;            ///< how many; 0: before any
+  ReturnStats stats;                   ///< over one episode in each evaluation environment
   std::vector<float> task_input = {};  ///< what it was told of the task then
 };
 
 /// What a personal learner is made of.
 struct PersonalParts {
-  std::unique_ptr<Learner> learner;
+  std::unique_ptr<Learner> learner;                   ///< of the task; not null
   std::vector<std::unique_ptr<Env>> evaluation_envs;  ///< one for each episode of an evaluation
   bool reset_moments = false;                         ///< the optimiser begins anew with each round
   /// Makes what a meta-policy gets to know a task by; null: it is told what the learner knows.
@@ -45,6 +45,7 @@ class PersonalLearner {
   /// Throws Error where ProximalAdam does.
   PersonalLearner(PersonalParts parts, const PersonalSettings& settings);
 
+  /// The layout of personal, auxiliary and meta-parameters alike.
   const ModelLayout& layout() const { return parts_.learner->policies().layout(); }
 
   /// The parameters every party begins with; depends on `seed` only, the same for all tasks.
@@ -62,7 +63,7 @@ class PersonalLearner {
 
   /// Parameters with this task's presence mask.
   const Model& personal() const { return personal_; }
-  const Model& auxiliary() const { return auxiliary_; }
+  const Model& auxiliary() const { return auxiliary_; }  ///< omega, with the same mask
 
   /// Return of `policy` on this task, greedy: exact where the learner knows the task's model, else
   /// the mean over one episode in each evaluation environment, whose starts depend on `rng` only.
@@ -88,12 +89,14 @@ class PersonalLearner {
     return recordWith(policy, adapted.task_input, rng);
   }
 
+  /// What PersonalParts gave, for tests and measurements.
   const Learner& learner() const { return *parts_.learner; }
   const ProximalAdam& adam() const { return std::get<ProximalAdam>(optimizer_); }  ///< of networks
 
   /// All that later rounds depend on, between two updates: parameters, optimiser, and the learner's
   /// state. Loaded by a learner of the same settings and task, it goes on bit for bit as this one.
   void saveState(StateWriter& writer) const;
+  /// Throws Error where the model, optimiser or learner refuses its part.
   void loadState(StateReader& reader);
 
  private:

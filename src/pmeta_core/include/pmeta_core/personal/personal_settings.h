@@ -9,9 +9,9 @@ namespace pmeta {
 /// At 0 they are each robot's own: a round does not reset them, and what is sent of them stays the
 /// meta-policy's.
 struct NetworkLambdas {
-  std::optional<double> actor;
-  std::optional<double> critic;  ///< of all critics
-  std::optional<double> encoder;
+  std::optional<double> actor;    ///< of the policy's network
+  std::optional<double> critic;   ///< of all critics
+  std::optional<double> encoder;  ///< of the inference network
 
   /// That of the network whose blocks are named "<network>.<...>".
   std::optional<double> of(const std::string& network) const {

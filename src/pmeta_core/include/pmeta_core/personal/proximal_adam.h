@@ -50,10 +50,12 @@ class ProximalAdam : public Optimizer<float> {
   /// if no update has begun.
   void beginUpdate();
 
+  /// As given to the constructor.
   const ProximalAdamSettings& settings() const { return settings_; }
-  std::size_t size() const { return first_moment_.size(); }
+  std::size_t size() const { return first_moment_.size(); }  ///< parameters
 
-  const AlignedFloats& firstMoment() const { return first_moment_; }
+  const AlignedFloats& firstMoment() const { return first_moment_; }  ///< Adam's m, one a parameter
+  /// Adam's v, one a parameter.
   const AlignedFloats& secondMoment() const { return second_moment_; }
 
   /// As if no update had been made.
@@ -61,7 +63,7 @@ class ProximalAdam : public Optimizer<float> {
 
   /// Adam's moments and count.
   void saveState(StateWriter& writer) const;
-  void loadState(StateReader& reader);
+  void loadState(StateReader& reader);  ///< refuses moments of another number of parameters
 
  private:
   // in one update each parameter has its turn once

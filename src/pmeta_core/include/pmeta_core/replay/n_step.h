@@ -24,7 +24,8 @@ class NStepAccumulator {
     std::vector<float> actions;       ///< n x action_size
     std::vector<double> returns;      ///< n: rewards so far, discounted
 
-    void saveState(StateWriter& writer) const;
+    void saveState(StateWriter& writer) const;  ///< all slots, waiting or not
+    /// Refuses another n or other sizes, and a slot or count out of range.
     void loadState(StateReader& reader);
   };
 
@@ -38,7 +39,8 @@ class NStepAccumulator {
   void add(int env, const float* observation, const float* action, const Step& step,
            const float* next_observation, PrioritisedReplay& replay);
 
-  void saveState(StateWriter& writer) const;
+  void saveState(StateWriter& writer) const;  ///< every environment's steps that still wait
+  /// Refuses as Queue::loadState() does, or where there are fewer environments.
   void loadState(StateReader& reader);
 
   const std::vector<Queue>& queues() const { return queues_; }  ///< by environment

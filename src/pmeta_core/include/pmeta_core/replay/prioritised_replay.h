@@ -40,12 +40,14 @@ class PrioritisedReplay {
   /// Sets p_i = |td_errors[b]| + 1e-6 for each sample b of `batch`.
   void setPriorities(const ReplayBatch& batch, const float* td_errors);
 
-  void saveState(StateWriter& writer) const;
+  void saveState(StateWriter& writer) const;  ///< transitions and their priorities
+  /// Refuses transitions or priorities that no run leaves; see ReplayBuffer and SumTree.
   void loadState(StateReader& reader);
 
-  std::size_t size() const { return buffer_.size(); }
-  const ReplayBuffer& buffer() const { return buffer_; }
-  const SumTree& tree() const { return tree_; }  ///< p_i^alpha by slot
+  std::size_t size() const { return buffer_.size(); }     ///< transitions held
+  const ReplayBuffer& buffer() const { return buffer_; }  ///< what is held, by slot
+  const SumTree& tree() const { return tree_; }           ///< p_i^alpha by slot
+  /// The largest p_i set so far, at least 1; not yet to the power of alpha.
   double maxPriority() const { return max_priority_; }
 
  private:

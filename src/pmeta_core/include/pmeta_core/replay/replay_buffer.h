@@ -30,19 +30,21 @@ class ReplayBuffer {
   /// Copies a transition and returns its slot.
   std::size_t add(const Transition& transition);
 
+  /// What is held there; `slot` must be below size().
   Transition operator[](std::size_t slot) const;
 
-  std::size_t capacity() const { return capacity_; }
-  std::size_t size() const { return size_; }  ///< transitions held
-  std::size_t next() const { return next_; }  ///< slot that add() writes next
-  int observationSize() const { return static_cast<int>(observation_size_); }
-  int actionSize() const { return static_cast<int>(action_size_); }
+  std::size_t capacity() const { return capacity_; }  ///< transitions it has room for
+  std::size_t size() const { return size_; }          ///< transitions held
+  std::size_t next() const { return next_; }          ///< slot that add() writes next
+  int observationSize() const { return static_cast<int>(observation_size_); }  ///< floats of s_t
+  int actionSize() const { return static_cast<int>(action_size_); }            ///< floats of a_t
 
   /// All transitions as they lie in memory, slot by slot: s_t, a_t, R_n, discount, s_{t+n}.
   const std::vector<float>& values() const { return values_; }
 
   /// Straight from and to its memory: no second copy is made.
   void saveState(StateWriter& writer) const;
+  /// Refuses more transitions than it has room for, and half ones.
   void loadState(StateReader& reader);
 
  private:

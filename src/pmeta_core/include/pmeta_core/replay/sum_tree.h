@@ -16,8 +16,9 @@ class SumTree {
   /// All weights 0. capacity: number of leaves, at least 1.
   explicit SumTree(std::size_t capacity);
 
-  std::size_t capacity() const { return capacity_; }
-  double total() const { return sums_[1]; }
+  std::size_t capacity() const { return capacity_; }  ///< number of leaves
+  double total() const { return sums_[1]; }           ///< sum of all weights
+  /// Weight of a leaf below capacity().
   double get(std::size_t leaf) const { return sums_[leaves_ + leaf]; }
 
   /// weight: finite, at least 0.
@@ -26,6 +27,7 @@ class SumTree {
   /// The weights of the first `count` leaves; loading refuses any that is not positive, or is
   /// beyond what a float can make of a TD error. All other leaves are 0.
   void saveState(StateWriter& writer, std::size_t count) const;
+  /// Takes them back, with all sums computed anew.
   void loadState(StateReader& reader, std::size_t count);
 
   /// The leaf whose weight covers `prefix` in [0, total()): the sums before it are at most

@@ -12,13 +12,13 @@ namespace pmeta {
 
 /// One line of final.csv: a kept policy on one task, on episodes that chose nothing.
 struct FreshReturn {
-  std::string snapshot;  ///< "last", "best" or "own_best"
-  int round = 0;         ///< the round it is from
-  PolicyKind policy = PolicyKind::kPersonal;
-  int trained_task = -1;        ///< whose personal policy; -1 for the meta-policy
-  int task = 0;                 ///< where it is evaluated
-  Split split = Split::kTrain;  ///< of `task`
-  ReturnStats stats;
+  std::string snapshot;                       ///< "last", "best" or "own_best"
+  int round = 0;                              ///< the round it is from
+  PolicyKind policy = PolicyKind::kPersonal;  ///< meta: after the most exploration episodes
+  int trained_task = -1;                      ///< whose personal policy; -1 for the meta-policy
+  int task = 0;                               ///< where it is evaluated
+  Split split = Split::kTrain;                ///< of `task`
+  ReturnStats stats;                          ///< over the fresh episodes
 };
 
 /// Keeps the policies of the last and of the best round, and evaluates them on fresh episodes.
@@ -41,6 +41,7 @@ class FreshEvaluation {
 
   /// The policies kept so far. Loading needs the agents, in the same order.
   void saveState(StateWriter& writer) const;
+  /// Refuses models that do not fit the agents.
   void loadState(StateReader& reader, const std::vector<TaskAgent>& agents);
 
   /// The rows as CSV, with a header.

@@ -22,10 +22,12 @@ class LoadedPolicy {
   LoadedPolicy(const LoadedPolicy&) = delete;
   LoadedPolicy& operator=(const LoadedPolicy&) = delete;
 
+  /// By the settings that the file holds.
   const Experiment& experiment() const { return experiment_; }
+  /// Of its task, or of task 0 for a meta-policy.
   const EnvSpec& spec() const { return env_->spec(); }
-  const Model& model() const { return model_; }
-  PolicyKind policy() const { return policy_; }
+  const Model& model() const { return model_; }  ///< parameters as in the file
+  PolicyKind policy() const { return policy_; }  ///< which of the two it is
   int task() const { return task_; }    ///< whose personal policy it is; -1 for a meta-policy
   int round() const { return round_; }  ///< rounds of training behind it
   /// For people, e.g. "personal policy of grid_4x4, round 10 of run RUN".

@@ -14,9 +14,9 @@ namespace pmeta {
 
 /// What a run in one process gives.
 struct LocalResult {
-  bool stopped = false;  ///< before the last round
-  std::vector<RoundBook::Round> rounds;
-  Model meta;                      ///< the last meta-policy
+  bool stopped = false;                  ///< before the last round
+  std::vector<RoundBook::Round> rounds;  ///< in order, those before resumed_round apart
+  Model meta;                            ///< the last meta-policy
   std::vector<FreshReturn> fresh;  ///< with fresh_episodes: the kept policies on fresh episodes
 };
 

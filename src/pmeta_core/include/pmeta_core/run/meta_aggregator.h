@@ -15,31 +15,34 @@ namespace pmeta {
 /// The aggregator's side of the algorithm: collects one update a task and mixes them. Knows no ROS.
 class MetaAggregator {
  public:
+  /// What becomes of an update that is offered.
   enum class Verdict {
-    kAccepted,
+    kAccepted,   ///< kept for this round
     kDuplicate,  ///< this task has already reported in this round
     kStale,      ///< of a round that is over
     kRefused,    ///< does not belong here; Answer::reason says why
   };
+  /// What offer() says of an update.
   struct Answer {
-    Verdict verdict = Verdict::kAccepted;
-    std::string reason;
+    Verdict verdict = Verdict::kAccepted;  ///< accepted, or why not
+    std::string reason;  ///< a sentence or clause for people; "" if it is accepted
   };
   /// How often each verdict was given to a task.
   struct Counts {
-    std::int64_t accepted = 0;
-    std::int64_t duplicate = 0;
-    std::int64_t stale = 0;
-    std::int64_t refused = 0;
-    std::int64_t excluded = 0;  ///< of those accepted: left out when the round was closed
-    std::string last_reason;    ///< of the newest update that was refused or left out; "" if none
+    std::int64_t accepted = 0;   ///< kept for a round
+    std::int64_t duplicate = 0;  ///< a second one in a round
+    std::int64_t stale = 0;      ///< of rounds that were over
+    std::int64_t refused = 0;    ///< that did not belong to the run
+    std::int64_t excluded = 0;   ///< of those accepted: left out when the round was closed
+    std::string last_reason;     ///< of the newest update that was refused or left out; "" if none
   };
   /// An update that came but was left out of an aggregation.
   struct Exclusion {
-    int task = 0;
+    int task = 0;        ///< whose update it was
     std::string reason;  ///< a clause: "its distance to the meta-policy, 812, is above ..."
   };
 
+  /// Begins with the initial meta-policy of that experiment, as round 0.
   explicit MetaAggregator(const Experiment& experiment);
 
   /// Checks an update and keeps it for this round. The update is shared, not copied.
@@ -61,8 +64,9 @@ class MetaAggregator {
   int expected() const { return static_cast<int>(updates_.size()); }  ///< updates of a full round
   int quorum() const { return quorum_; }                              ///< that suffice once late
   std::vector<int> reported() const;                                  ///< tasks in, ascending
-  std::vector<int> missing() const;  ///< tasks still out, ascending
-  bool complete() const { return missing().empty(); }
+  std::vector<int> missing() const;                    ///< tasks still out, ascending
+  bool complete() const { return missing().empty(); }  ///< have all tasks reported?
+  /// Would what is in suffice for a late round?
   bool hasQuorum() const { return static_cast<int>(reported().size()) >= quorum_; }
 
   /// Mixes what has been reported, in task order, without what the settings' NormBound objects to,
@@ -80,6 +84,7 @@ class MetaAggregator {
   /// Meta-policy, round, participants and counts; what has been reported for the open round is left
   /// out: agents send it again.
   void saveState(StateWriter& writer) const;
+  /// Refuses another number of tasks or rounds than the experiment has.
   void loadState(StateReader& reader);
 
   const std::vector<Counts>& counts() const { return counts_; }     ///< by task

@@ -19,6 +19,7 @@ namespace pmeta {
 
 /// How long rounds take and are waited for, in seconds. By default nobody is ever late.
 struct RoundTimes {
+  /// For what is never due.
   static constexpr double kForEver = std::numeric_limits<double>::infinity();
 
   double pace = 0;                  ///< least time from one meta-policy to the next
@@ -29,10 +30,12 @@ struct RoundTimes {
 
 /// How a run stands, for people.
 struct RunStanding {
+  /// As RoundSummary.msg has them.
   enum class State { kRunning, kLate, kPaused, kBlocked, kFinished, kStopped };
 
+  /// kBlocked where the disk takes nothing, kLate where agents are waited for.
   State state = State::kRunning;
-  std::string message;
+  std::string message;       ///< the state in a sentence
   std::vector<int> missing;  ///< who is waited for or silent, where the message is about them
 };
 
@@ -40,6 +43,7 @@ struct RunStanding {
 /// be without.
 class RoundOutlet {
  public:
+  /// How much a sentence of log() matters.
   enum class Level { kInfo, kWarning, kError };
 
   virtual ~RoundOutlet() = default;
@@ -52,9 +56,11 @@ class RoundOutlet {
   /// Both go to the disk, a round's record before the checkpoint of a later round. An Error holds
   /// the run, and the same is asked for again; what has failed must have left nothing behind.
   virtual void write(const RoundBook::Round& round) = 0;
+  /// See write(): RoundDriver::saveState() after `round` closed rounds.
   virtual void saveCheckpoint(int round) = 0;
 
   virtual void showRound(const RoundBook::Round&) {}  ///< it is complete, and yet to be written
+  /// How the run stands has changed, or is worth repeating.
   virtual void tell(const RunStanding&) {}
   virtual void log(Level, const std::string&) {}  ///< a sentence for the console
 };
@@ -74,12 +80,12 @@ class RoundOutlet {
 /// 2 s.
 class RoundDriver {
  public:
-  using Clock = std::chrono::steady_clock;
-  using Time = Clock::time_point;
+  using Clock = std::chrono::steady_clock;  ///< of `now`; it is never asked for the time
+  using Time = Clock::time_point;           ///< a point of that clock
   /// To somebody who asks something of a run.
   struct Answer {
-    bool taken = false;
-    std::string message;
+    bool taken = false;   ///< false: it comes to nothing, and `message` says why
+    std::string message;  ///< a clause for whoever asked
   };
 
   /// All that is referred to must live as long as this.
@@ -87,6 +93,7 @@ class RoundDriver {
 
   // what comes in: the owner's thread
 
+  /// As MetaAggregator::offer().
   MetaAggregator::Answer offer(std::shared_ptr<const AuxiliaryUpdate> update);
   /// Counts an update that could not even be offered, as MetaAggregator does.
   void countRefusal(int task, const std::string& reason) { aggregator_.countRefusal(task, reason); }
@@ -102,7 +109,7 @@ class RoundDriver {
   Answer pause(bool on);
   /// The next meta-policy goes out with MetaPolicy::evaluate, or with MetaPolicy::checkpoint.
   Answer askForEvaluation();
-  Answer askForCheckpoint();
+  Answer askForCheckpoint();  ///< see askForEvaluation()
   /// Nothing can be asked for any more.
   void endRequests() { over_ = true; }
 
@@ -121,14 +128,17 @@ class RoundDriver {
   /// Tells people this, with whatever keeps the run from going on.
   void say(const std::string& message, Time now);
 
+  /// Updates in hand, and what became of others.
   const MetaAggregator& aggregator() const { return aggregator_; }
-  const RoundBook& book() const { return book_; }
+  const RoundBook& book() const { return book_; }               ///< returns in hand
   int round() const { return aggregator_.metaPolicy().round; }  ///< closed so far
+  /// From 1; the last one once all are closed.
   int roundInHand() const { return std::min(round() + 1, rounds_); }
   const std::string& diskTrouble() const { return disk_trouble_; }  ///< "" while writing works
 
   /// What a run goes on from: aggregator and book.
   void saveState(StateWriter& writer) const;
+  /// Throws Error where one of them does; to be called before begin().
   void loadState(StateReader& reader);
 
  private:

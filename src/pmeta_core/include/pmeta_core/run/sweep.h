@@ -11,7 +11,7 @@ namespace pmeta {
 
 /// One experiment over every combination of some settings' values.
 struct SweepPlan {
-  std::string name;    ///< runs go to <results_dir>/sweeps/<name>/<experiment>/<run_id>
+  std::string name;    ///< runs go to RESULTS_DIR/sweeps/NAME/EXPERIMENT/RUN_ID
   std::string config;  ///< path of the settings file
   /// "key:=a,b,c", "seed:=0-9" or "seed:=0-2,5" (ranges of whole numbers), or "key:=value" for
   /// all runs.
@@ -24,15 +24,15 @@ struct SweepPlan {
 
 /// Progress of a sweep after one more run.
 struct SweepProgress {
-  int done = 0;  ///< runs finished or found finished
-  int total = 0;
-  bool skipped = false;  ///< this one was found finished
-  std::string in_use;    ///< this one is left to whom else writes it, as a sentence; or ""
-  std::string run_id;
+  int done = 0;                ///< runs finished or found finished
+  int total = 0;               ///< runs of the plan
+  bool skipped = false;        ///< this one was found finished
+  std::string in_use;          ///< this one is left to whom else writes it, as a sentence; or ""
+  std::string run_id;          ///< of this one
   double personal_return = 0;  ///< of the run's last round; NaN if it was not run
-  double meta_return = 0;
-  double seconds = 0;      ///< of this run
-  double eta_seconds = 0;  ///< for the rest
+  double meta_return = 0;      ///< the same of the meta-policy
+  double seconds = 0;          ///< of this run
+  double eta_seconds = 0;      ///< for the rest
 };
 
 /// Throws Error if the run's folder holds a run with other defining settings, but for the
@@ -41,7 +41,7 @@ void requireSameSettings(const Experiment& experiment);
 
 /// A run of a sweep that ended with an error.
 struct SweepFailure {
-  std::string run_id;
+  std::string run_id;  ///< of the run that failed
   std::string reason;  ///< a sentence
 };
 

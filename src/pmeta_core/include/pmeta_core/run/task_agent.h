@@ -17,7 +17,7 @@ class TaskAgent {
  public:
   /// What one round of training gives.
   struct RoundResult {
-    AuxiliaryUpdate update;
+    AuxiliaryUpdate update;              ///< to be sent
     std::optional<TaskReturn> personal;  ///< in rounds that evaluate; counts all since the last
                                          ///< scheduled one
     std::int64_t env_steps = 0;          ///< of this round
@@ -29,16 +29,19 @@ class TaskAgent {
 
     /// All but the update, which follows from the agent's state.
     void saveState(StateWriter& writer) const;
+    /// Refuses what no round gives; `update` and `losses` stay empty.
     void loadState(StateReader& reader);
   };
 
   /// Called after each update with the number done in this round; false stops training.
   using KeepGoing = std::function<bool(int updates_done)>;
 
+  /// Throws Error where Experiment::makeLearner() does.
   TaskAgent(const Experiment& experiment, int task);
 
-  int task() const { return task_; }
+  int task() const { return task_; }                       ///< a training or test task
   bool trains() const { return split_ == Split::kTrain; }  ///< a test task only evaluates
+  /// Of all parameters that it takes and sends.
   const ModelLayout& layout() const { return learner_->layout(); }
 
   /// One round from `meta`: reset, R updates, and evaluation of the personal policy where
@@ -62,6 +65,7 @@ class TaskAgent {
   /// after the most exploration episodes it is evaluated after.
   ReturnStats evaluateFresh(PolicyKind kind, const Model& policy, int episodes) const;
 
+  /// phi as the last round left it, with the task's presence mask.
   const Model& personal() const { return learner_->personal(); }
   /// What tells the personal policy its task beside the observations; empty if nothing does.
   std::vector<float> taskInput() const { return learner_->taskInput(learner_->personal()); }
@@ -76,6 +80,8 @@ class TaskAgent {
   /// be called between two rounds, where no generator is alive; throws Error after a round that was
   /// stopped, or for a test task, which has no state.
   void saveState(StateWriter& writer) const;
+  /// Refuses the state of another task or of a round beyond the run's last; throws Error for a test
+  /// task.
   void loadState(StateReader& reader);
 
   /// One greedy episode, from the same start whatever the policy and round.

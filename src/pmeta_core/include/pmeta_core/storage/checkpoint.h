@@ -20,8 +20,8 @@ constexpr int kAggregator = -1;
 
 /// Of which run, party and round a checkpoint is.
 struct CheckpointIdentity {
-  std::string run_id;
-  int task = kAggregator;
+  std::string run_id;                           ///< checkpoints of other runs are refused
+  int task = kAggregator;                       ///< whose it is
   int round = 0;                                ///< rounds that the party has behind it
   std::string layout;                           ///< ModelLayout::text() of the model
   std::map<std::string, std::string> settings;  ///< Experiment::definingSettings()
@@ -49,12 +49,14 @@ class CheckpointFile {
   CheckpointFile(const CheckpointFile&) = delete;
   CheckpointFile& operator=(const CheckpointFile&) = delete;
 
-  const CheckpointIdentity& identity() const { return identity_; }
+  const CheckpointIdentity& identity() const { return identity_; }  ///< as the file says
 
   /// Throws Error unless this is a checkpoint of that run, party and model; names the first setting
   /// that differs. The round may be any.
   void require(const CheckpointIdentity& expected) const;
 
+  /// Hands the state to `load`, array by array as that asks for it; throws Error where that refuses
+  /// one.
   void load(const std::function<void(StateReader&)>& load);
 
  private:
@@ -65,7 +67,7 @@ class CheckpointFile {
   CheckpointIdentity identity_;
 };
 
-/// The checkpoints of one party in <run folder>/checkpoint: task_3.round_12.h5 and the like, or
+/// The checkpoints of one party in RUN_DIR/checkpoint: task_3.round_12.h5 and the like, or
 /// aggregator.round_12.h5. The last two are kept.
 ///
 /// Parties write theirs at their own time: a run goes on from the newest round of which the

@@ -19,8 +19,8 @@ namespace pmeta {
 /// the blocks of the layout (F32 or F64); a model with a presence mask has a tensor "NAME.present"
 /// (U8, the same shape) for each of them.
 struct PolicyFile {
-  Model model;
-  std::map<std::string, std::string> metadata;
+  Model model;                                  ///< the parameters
+  std::map<std::string, std::string> metadata;  ///< see policyMetadata()
 };
 
 /// Writes the file, never half of it. The key "layout" is added to the metadata. Throws Error if
@@ -46,7 +46,7 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment, 
                                                   const std::vector<float>& task_input = {});
 
 /// Writes a policy into the run's folder, as policies/meta.safetensors or
-/// policies/task_<i>.safetensors (`task` does not matter to a meta-policy). Throws Error.
+/// policies/task_I.safetensors (`task` does not matter to a meta-policy). Throws Error.
 void saveRunPolicy(const Experiment& experiment, PolicyKind policy, int task, int round,
                    const Model& model, const std::vector<float>& task_input = {});
 

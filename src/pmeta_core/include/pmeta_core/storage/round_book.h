@@ -14,7 +14,7 @@ namespace pmeta {
 
 /// One line of rounds.csv: a return with the counters summed over the rounds so far.
 struct RoundRow {
-  TaskReturn result;
+  TaskReturn result;           ///< as it arrived
   std::int64_t env_steps = 0;  ///< cumulative, of the task
   std::int64_t updates = 0;    ///< cumulative, of the task
 };
@@ -24,11 +24,14 @@ struct RoundRow {
 /// run's record independent of arrival order.
 class RoundBook {
  public:
+  /// A complete round: how it went, and what there is to write of it.
   struct Round {
-    RoundSummary summary;
+    RoundSummary summary;  ///< means and estimates filled in
+    /// In the order of rounds.csv; none if the round does not evaluate.
     std::vector<RoundRow> rows;
   };
 
+  /// Waits for round 1 of that experiment, whose run_id it takes.
   explicit RoundBook(const Experiment& experiment);
 
   /// False if the return is a duplicate, of a round given out already, or of no task of this run.
@@ -45,12 +48,13 @@ class RoundBook {
   /// closed rounds come out as they are.
   std::vector<Round> take(bool force = false);
 
-  int roundsTaken() const { return next_ - 1; }
+  int roundsTaken() const { return next_ - 1; }  ///< how many take() has given out
   /// Of those rounds, the episodes that broke down.
   std::int64_t brokenEpisodes() const { return broken_episodes_; }
 
   /// Rounds that are open, with the returns in hand, and the counters of those given out.
   void saveState(StateWriter& writer) const;
+  /// Refuses rounds and returns that this run does not wait for.
   void loadState(StateReader& reader);
 
   /// Has every training task's personal return of `round` arrived?

@@ -23,8 +23,8 @@ class RunLock {
   /// Error.
   explicit RunLock(const std::string& run_dir);
   ~RunLock();
-  RunLock(RunLock&& other) noexcept;
-  RunLock& operator=(RunLock other) noexcept;
+  RunLock(RunLock&& other) noexcept;           ///< the right goes to the new one
+  RunLock& operator=(RunLock other) noexcept;  ///< lets its own folder go and takes the other's
 
   /// Lets the folder go before the end of the scope.
   void release() noexcept;

@@ -11,43 +11,43 @@ namespace pmeta {
 /// The largest difference between a recorded and a simulated number, and the line where it is; 0
 /// where all are equal.
 struct LargestError {
-  double value = 0;
-  long line = 0;
+  double value = 0;  ///< absolute; infinite where the simulated number is not finite
+  long line = 0;     ///< of the file, counted from 1; 0 where there is no error
 };
 
 /// What a replay found in one column.
 struct ColumnErrors {
-  std::string column;
-  LargestError single_step;
-  LargestError open_loop;  ///< as far as a tolerance holds
-  LargestError unbounded;  ///< open loop, where rounding has grown beyond any tolerance
+  std::string column;        ///< its name in the file
+  LargestError single_step;  ///< each step from the row recorded before it
+  LargestError open_loop;    ///< as far as a tolerance holds
+  LargestError unbounded;    ///< open loop, where rounding has grown beyond any tolerance
 };
 
 /// One number that lies beyond its tolerance.
 struct Deviation {
-  ReplayMode mode = ReplayMode::kSingleStep;
-  long line = 0;  ///< of the file, counted from 1
-  std::string column;
-  int task = 0;
-  int seq = 0;
-  int t = 0;
-  double recorded = 0;
-  double simulated = 0;
-  double tolerance = 0;
+  ReplayMode mode = ReplayMode::kSingleStep;  ///< the simulation that went astray
+  long line = 0;                              ///< of the file, counted from 1
+  std::string column;                         ///< its name in the file
+  int task = 0;                               ///< 0 where the file has no column for it
+  int seq = 0;                                ///< sequence, as the file numbers them
+  int t = 0;                                  ///< step within the sequence, at least 1
+  double recorded = 0;                        ///< what the file says
+  double simulated = 0;                       ///< what the environment gave
+  double tolerance = 0;                       ///< largest difference that is allowed here
 };
 
 /// What checkTrajectories found.
 struct TrajectoryReport {
-  std::string kind;
-  std::string path;
-  int sequences = 0;
+  std::string kind;          ///< as given to checkTrajectories()
+  std::string path;          ///< of the file
+  int sequences = 0;         ///< how many begin in the file
   long steps = 0;            ///< steps that were simulated, in each mode
   long unbounded_steps = 0;  ///< of those, how many no tolerance of the open loop holds for
-  std::vector<ColumnErrors> columns;
-  long deviations = 0;             ///< numbers beyond their tolerance
-  std::optional<Deviation> first;  ///< the first of them, in the order of the file
+  std::vector<ColumnErrors> columns;  ///< those compared, in the simulator's order
+  long deviations = 0;                ///< numbers beyond their tolerance
+  std::optional<Deviation> first;     ///< the first of them, in the order of the file
 
-  bool ok() const { return deviations == 0; }
+  bool ok() const { return deviations == 0; }  ///< does every number lie within its tolerance?
 };
 
 /// Simulates every recorded step of a trajectory file again, one at a time and open loop, and

@@ -29,8 +29,9 @@ class TrajectorySimulator {
  public:
   virtual ~TrajectorySimulator() = default;
 
+  /// What the file must have; the same for as long as this lives.
   virtual const TrajectoryColumns& columns() const = 0;
-  virtual int numTasks() const = 0;
+  virtual int numTasks() const = 0;  ///< tasks that start() takes, from 0
 
   /// Takes up a recorded state of `task`: columns().state.size() numbers. `ended`: this row of the
   /// sequence, or one before it, was terminal.
