@@ -13,6 +13,8 @@
 #include <QLabel>
 #include <QProgressBar>
 #include <QPushButton>
+#include <QScreen>
+#include <QShowEvent>
 #include <QTableWidget>
 #include <atomic>
 #include <cmath>
@@ -208,6 +210,17 @@ TEST_F(RunPanelTest, TakesNothingThatItIsToldForMarkup) {
   for (const QLabel* label : panel_->findChildren<QLabel*>()) {
     EXPECT_EQ(label->textFormat(), Qt::PlainText) << label->objectName().toStdString();
   }
+}
+
+TEST_F(RunPanelTest, KeepsAWindowWithinTheScreen) {
+  QWidget window;
+  window.resize(8000, 6000);
+  window.show();
+  QShowEvent shown;
+  panel_->eventFilter(&window, &shown);
+  const QSize screen = QGuiApplication::primaryScreen()->availableSize();
+  EXPECT_LE(window.width(), screen.width());
+  EXPECT_LE(window.height(), screen.height());
 }
 
 TEST_F(RunPanelTest, SaysThatThereIsNoRun) {

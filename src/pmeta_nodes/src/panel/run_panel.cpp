@@ -12,8 +12,10 @@
 #include <QProgressBar>
 #include <QPushButton>
 #include <QResizeEvent>
+#include <QScreen>
 #include <QTableWidget>
 #include <QVBoxLayout>
+#include <QWindow>
 #include <pluginlib/class_list_macros.hpp>
 
 #include <algorithm>
@@ -39,6 +41,13 @@ const char* const kFaintStyle = "color: #666666";
 const char* const kWarningStyle = "color: #b3261e";
 
 enum Column { kTask, kPersonal, kMeta, kAgent, kSpeed, kColumns };
+
+// settings files of rviz name a size, which not every window manager holds to the screen's
+void keepOnScreen(QWidget& window) {
+  const QWindow* shown = window.windowHandle();
+  if (shown == nullptr) return;
+  window.resize(window.size().boundedTo(shown->screen()->availableGeometry().size()));
+}
 
 QString text(const std::string& words) { return QString::fromStdString(words); }
 
@@ -193,12 +202,18 @@ void RunPanel::onInitialize() {
   auto* window =
       manager == nullptr ? nullptr : qobject_cast<QMainWindow*>(manager->getParentWindow());
   if (window == nullptr || window->centralWidget() == nullptr) return;
+  window->installEventFilter(this);
   window->centralWidget()->installEventFilter(this);
   fitView(window->centralWidget()->size());
 }
 
 bool RunPanel::eventFilter(QObject* watched, QEvent* event) {
-  if (event->type() == QEvent::Resize) fitView(static_cast<QResizeEvent*>(event)->size());
+  auto* widget = qobject_cast<QWidget*>(watched);
+  const bool is_window = widget != nullptr && widget->isWindow();
+  if (is_window && event->type() == QEvent::Show) keepOnScreen(*widget);
+  if (!is_window && event->type() == QEvent::Resize) {
+    fitView(static_cast<QResizeEvent*>(event)->size());
+  }
   return rviz::Panel::eventFilter(watched, event);
 }
 

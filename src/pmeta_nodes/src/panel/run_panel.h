@@ -26,7 +26,8 @@ class RunPanel : public rviz::Panel {
  public:
   explicit RunPanel(QWidget* parent = nullptr);  ///< as pluginlib wants it
 
-  /// Keeps the scene as large as the window allows.
+  /// Keeps the scene as large as the window allows, and the window within the screen as it is
+  /// shown.
   void onInitialize() override;
   /// Sees when the window takes another size.
   bool eventFilter(QObject* watched, QEvent* event) override;
