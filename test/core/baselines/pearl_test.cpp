@@ -210,7 +210,7 @@ TEST(Pearl, IsRegistered) {
   EXPECT_EQ(kind->metaInput(-1, 2), std::vector<float>(5));
   const test::DensePoint env({1, 0});
   const auto learner = kind->make(test::oppositeGoals());
-  EXPECT_EQ(kind->policies(env)->layout(), learner->policies().layout());
+  EXPECT_EQ(kind->policies(env, 2)->layout(), learner->policies().layout());
 }
 
 }  // namespace
