@@ -47,6 +47,10 @@ std::string rowsOf(const Experiment& experiment) {
                             "\n");
 }
 
+std::string lossesOf(const Experiment& experiment) {
+  return readFile(experiment.runDir() + "/losses.csv");
+}
+
 std::uint32_t policyOf(const Experiment& experiment) {
   return loadPolicy(experiment.runDir() + "/policies/meta.safetensors").model.checksum();
 }
@@ -116,6 +120,8 @@ TEST(MetaTrainer, ResumedRunIsTheUninterruptedOne) {
   runLocally(resumed, &log, {}, point.round);
   log.finish("finished");
   EXPECT_EQ(rowsOf(resumed), rowsOf(uninterrupted));
+  EXPECT_EQ(lossesOf(resumed), lossesOf(uninterrupted));
+  EXPECT_THAT(lossesOf(resumed), HasSubstr("4,0,return_after_step,"));
   EXPECT_EQ(policyOf(resumed), policyOf(uninterrupted));
 }
 

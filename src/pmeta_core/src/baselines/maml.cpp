@@ -111,7 +111,7 @@ IterationStats Maml::iterate(std::uint64_t seed, std::uint64_t iteration) {
     data[slot].after = sample(adapted, 1);
     after[slot] = sampler.meanReturn();
   });
-  losses_ = {{"return after the inner step", 0}, {"return before it", 0}};
+  losses_ = {{"return_after_step", 0}, {"return_before_step", 0}};
   for (std::size_t slot = 0; slot < samplers_.size(); ++slot) {
     stats.env_steps[static_cast<std::size_t>(taskOf(slot))] +=
         static_cast<std::int64_t>(data[slot].before.rows + data[slot].after.rows);

@@ -44,8 +44,8 @@ std::int64_t MamlTrpo::metaStep(InnerStepObjective& objective, std::vector<doubl
   theta = step.parameters;
   const TriedStep last = step.accepted ? step.tried.back() : TriedStep{0, 0};
   losses.push_back({"surrogate", last.loss});
-  losses.push_back({"KL", last.kl});
-  losses.push_back({"step lengths tried", static_cast<double>(step.tried.size())});
+  losses.push_back({"kl", last.kl});
+  losses.push_back({"step_lengths_tried", static_cast<double>(step.tried.size())});
   return 1;
 }
 

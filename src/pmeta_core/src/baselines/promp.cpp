@@ -56,7 +56,7 @@ std::int64_t ProMp::metaStep(InnerStepObjective& objective, std::vector<double>&
   const std::vector<double> kls = objective.innerKl();
   const double kl = std::accumulate(kls.begin(), kls.end(), 0.0) / static_cast<double>(kls.size());
   losses.push_back({"surrogate", loss(objective)});
-  losses.push_back({"KL", kl});
+  losses.push_back({"kl", kl});
   if (settings_.kl_target > 0) {
     if (kl < settings_.kl_target / 1.5) kl_coefficient_ /= 2;
     if (kl > settings_.kl_target * 1.5) kl_coefficient_ *= 2;

@@ -30,6 +30,8 @@ std::vector<int> readTasks(StateReader& reader, const std::string& name) {
   return {tasks.begin(), tasks.end()};
 }
 
+}  // namespace
+
 void saveLosses(StateWriter& writer, const std::vector<Loss>& losses) {
   std::string names;
   std::vector<double> values;
@@ -54,8 +56,6 @@ std::vector<Loss> readLosses(StateReader& reader) {
   for (std::size_t i = 0; i < losses.size(); ++i) losses[i].value = values[i];
   return losses;
 }
-
-}  // namespace
 
 const char* name(PolicyKind policy) {
   return policy == PolicyKind::kPersonal ? "personal" : "meta";

@@ -8,7 +8,6 @@
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/stopwatch.h"
 #include "pmeta_core/run/divergence.h"
-#include "pmeta_core/run/task_agent.h"
 
 namespace pmeta {
 
@@ -61,7 +60,8 @@ std::optional<RoundResult> MetaTrainer::trainRound(const MetaPolicy& meta,
   between_ = false;
   learner_->setModel(meta.model);
   if (meta.round != round_) {
-    const Totals none{std::vector<std::int64_t>(totals_.begin()->second.env_steps.size()), 0, 0};
+    const Totals none{
+        std::vector<std::int64_t>(totals_.begin()->second.env_steps.size()), 0, 0, {}};
     totals_ = {{meta.round, none}};
     iterations_ = static_cast<std::uint64_t>(meta.round) << 32;  // draws that were not made before
     surplus_ = 0;
@@ -78,7 +78,7 @@ std::optional<RoundResult> MetaTrainer::trainRound(const MetaPolicy& meta,
   last_.env_steps = totals.steps() - before.steps();
   last_.updates = totals.updates - before.updates;
   last_.broken_episodes = totals.broken_episodes - before.broken_episodes;
-  last_.losses = learner_->losses();
+  last_.losses = totals.losses;
   last_.loss = last_.losses.empty() ? 0 : last_.losses.front().value;
   last_.distance = distance(learner_->model(), meta.model);
   totals_[round] = std::move(totals);
@@ -97,6 +97,7 @@ bool MetaTrainer::train(int round, const KeepGoing& keep_going, Totals& totals) 
       totals.env_steps[k] += stats.env_steps[k];
     }
     totals.updates += stats.updates;
+    totals.losses = learner_->losses();
     totals.broken_episodes += stats.broken_episodes;
     broken_episodes_ += stats.broken_episodes;
     for (const Loss& loss : learner_->losses()) {
@@ -197,7 +198,9 @@ void MetaTrainer::addCosts(TaskReturn& result) const {
   const auto task = static_cast<std::size_t>(result.task);
   result.env_steps = now.env_steps[task] - before.env_steps[task];
   result.updates = now.updates - before.updates;
-  if (task == 0) result.broken_episodes += now.broken_episodes - before.broken_episodes;
+  if (task != 0) return;
+  result.broken_episodes += now.broken_episodes - before.broken_episodes;
+  result.losses = now.losses;
 }
 
 Episode MetaTrainer::recordMeta(const MetaPolicy& meta, int task) const {
@@ -261,24 +264,14 @@ void MetaTrainer::Totals::saveState(StateWriter& writer) const {
   writer.array("env_steps", env_steps);
   writer.count("updates", updates);
   writer.count("broken_episodes", broken_episodes);
+  saveLosses(writer, losses);
 }
 
 void MetaTrainer::Totals::loadState(StateReader& reader) {
   reader.counts("env_steps", env_steps);
   updates = reader.count("updates");
   broken_episodes = reader.count("broken_episodes");
-}
-
-std::vector<std::unique_ptr<Party>> makeParties(const Experiment& experiment) {
-  std::vector<std::unique_ptr<Party>> parties;
-  if (experiment.hasMetaLearner()) {
-    parties.push_back(std::make_unique<MetaTrainer>(experiment));
-    return parties;
-  }
-  for (int task = 0; task < experiment.totalTasks(); ++task) {
-    parties.push_back(std::make_unique<TaskAgent>(experiment, task));
-  }
-  return parties;
+  losses = readLosses(reader);
 }
 
 }  // namespace pmeta

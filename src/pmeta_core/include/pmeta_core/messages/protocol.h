@@ -36,6 +36,11 @@ struct AuxiliaryUpdate {
   std::string settings_hash;  ///< Experiment::settingsHash() of the agent
 };
 
+/// The state of losses: their names and values.
+void saveLosses(StateWriter& writer, const std::vector<Loss>& losses);
+/// Refuses losses without names, or too many of them.
+std::vector<Loss> readLosses(StateReader& reader);
+
 /// Whose parameters a policy has.
 enum class PolicyKind { kPersonal, kMeta };
 /// Was the task trained on, or held out for the meta-policy?
@@ -56,16 +61,19 @@ struct TaskReturn {
   Split split = Split::kTrain;  ///< of `task`
   /// PP is made of personal returns, MP of the meta-policy's.
   PolicyKind policy = PolicyKind::kPersonal;
-  int context_episodes = 0;    ///< meta-policy: exploration episodes that it has adapted from
-  double mean = 0;             ///< mean undiscounted return
-  double std = 0;              ///< over episodes
-  int episodes = 0;            ///< of the mean; start states where it is exact
-  std::int64_t env_steps = 0;  ///< training transitions of this round; 0 for the meta-policy
-  std::int64_t updates = 0;    ///< personalised updates of this round; 0 for the meta-policy
+  int context_episodes = 0;  ///< meta-policy: exploration episodes that it has adapted from
+  double mean = 0;           ///< mean undiscounted return
+  double std = 0;            ///< over episodes
+  int episodes = 0;          ///< of the mean; start states where it is exact
+  /// Training transitions since the last return: personal, or with a meta-learner the meta-policy's
+  /// before exploration; else 0.
+  std::int64_t env_steps = 0;
+  std::int64_t updates = 0;  ///< of the policy, likewise
   /// Episodes whose simulation broke down: of the evaluation, and of training since the last.
   std::int64_t broken_episodes = 0;
   double seconds = 0;  ///< wall time of this round's training and evaluation
-  /// Personal: all that the learner measured at the last update, see Learner::losses().
+  /// All that the learner measured at the last update, see Learner::losses(); with a meta-learner
+  /// in the return of task 0 that has its costs. Else none.
   std::vector<Loss> losses;
 
   /// All but run_id, which whoever loads it knows.

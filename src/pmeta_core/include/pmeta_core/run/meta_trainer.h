@@ -48,6 +48,7 @@ class MetaTrainer : public Party {
     std::vector<std::int64_t> env_steps;  // by training task
     std::int64_t updates = 0;
     std::int64_t broken_episodes = 0;
+    std::vector<Loss> losses;  // of the last iteration
 
     std::int64_t steps() const;
     void saveState(StateWriter& writer) const;
@@ -88,9 +89,5 @@ class MetaTrainer : public Party {
   std::int64_t broken_episodes_ = 0;
   std::optional<Evaluated> evaluated_;  // the newest
 };
-
-/// Who trains in a run, in the order of their numbers: a TaskAgent for each training and test task,
-/// or the MetaTrainer.
-std::vector<std::unique_ptr<Party>> makeParties(const Experiment& experiment);
 
 }  // namespace pmeta
