@@ -13,8 +13,9 @@ import pmeta_archives as pa
 import pmeta_figures as pf
 import pmeta_margins as pm
 import pmeta_method_curves as pmc
-import pmeta_methods as pms
+import pmeta_runs as pr
 import pmeta_statistics as ps
+import pmeta_trajectories as pmt
 import report
 import results
 
@@ -67,9 +68,6 @@ def test_such_runs_alone_have_no_columns_of_personal_policies(tmp_path):
     # there is nothing to set it beside
     assert not [name for name in names if "comparison" in name or "margins" in name]
     assert "no method that learns all tasks at once" in fails(tmp_path, "--what", "comparison")
-    page = tmp_path / "report.html"
-    call(report.main, tmp_path, "-o", page)
-    assert "GAMMA" in page.read_text(encoding="utf-8")
 
 
 def test_what_an_algorithm_has_no_use_for_tells_it_from_nobody(tmp_path, mixed):
@@ -83,9 +81,12 @@ def test_what_an_algorithm_has_no_use_for_tells_it_from_nobody(tmp_path, mixed):
         "MP, PEARL C=20"]
 
 
-def test_all_of_it_is_drawn_and_told(tmp_path, mixed):
-    out, err = plot(tmp_path, "--format", "png", "--out", tmp_path / "out")
-    assert err == "plot: warning: unseen_tasks shows 2 of the 2 groups.\n" or err == ""
+def test_all_of_it_is_drawn_and_told(tmp_path):
+    write_run(tmp_path)
+    write_at_once(tmp_path, contexts=(0, 2), tests=1)
+    out, err = plot(tmp_path, "--what", "comparison,unseen", "--format", "png", "--out",
+                    tmp_path / "out")
+    assert err == ""
     assert {"comparison.png", "comparison_unseen.png", "margins.csv"} <= set(
         os.listdir(str(tmp_path / "out")))
     assert "margins over other methods" in out and "Margin: (ours - theirs)" in out
@@ -239,6 +240,77 @@ def test_percent_are_of_the_size_of_theirs():
     assert (value, low, high) == (pytest.approx(20), pytest.approx(10), pytest.approx(30))
     value, (low, high) = ps.difference([3, 5], [1, 1])
     assert (value, low, high) == (3, 2, 4)
+
+
+WAYS = "policy,split,task,context_episodes,step,observation_0,observation_1"
+
+
+@pytest.fixture
+def robots(tmp_path):
+    """Folders of ours and of another, which have ways to goals at (1, 0), (0, 1), and (-1, 0)."""
+    ours = write_run(tmp_path, experiment="points", contexts=(0, 5, 15), tests=1)
+    theirs = write_at_once(tmp_path, "pearl", experiment="points", contexts=(0, 5, 15), tests=1)
+    for folder in (ours, theirs):
+        for name in ("config.yaml", "manifest.json"):
+            edit(folder, name, lambda t: t.replace("gridworld", "sparse_point_robot"))
+        for old, new in (("zeta 3,", "goal at (1.000, 0.000),"), ("zeta 3.5", "goal at (0.0, 1.0)"),
+                         ("zeta 4", "goal at (-1.000, 0.000)")):
+            edit(folder, "manifest.json", lambda t, old=old, new=new: t.replace(old, new))
+        lines = [WAYS]
+        for policy, counts in (("personal", (0,)), ("meta", (0, 5, 15))):
+            for count in counts:
+                for task in range(2 if policy == "personal" else 3):
+                    # the further it explored, the more it has found
+                    far = 0.95 if policy == "personal" or count > 5 * task else 0.3
+                    x, y = ((far, 0), (0, far), (-far, 0))[task]
+                    for step, part in enumerate((0, 0.5, 1)):
+                        lines.append("%s,%s,%d,%d,%d,%r,%r" % (
+                            policy, "test" if task == 2 else "train", task, count, step, part * x,
+                            part * y))
+        keep = [line for line in lines if folder == ours or not line.startswith("personal")]
+        with open(os.path.join(folder, "trajectories.csv"), "w") as file:
+            file.write("\n".join(keep) + "\n")
+    return ours, theirs
+
+
+def test_ways_to_the_goals_are_drawn_after_each_number_of_episodes(tmp_path, robots):
+    [(figure, name)] = drawn(tmp_path, pmt.draw_trajectories)
+    assert name == "trajectories"
+    titles = [axis.get_title("left") for axis in figure.axes]
+    assert titles == ["PP, pMeta-RL: 2 of 2 goals", "",
+                      "MP, pMeta-RL, c_1:5: 1 of 2 goals, 0 of 1 unseen",
+                      "MP, pMeta-RL, c_1:15: 2 of 2 goals, 1 of 1 unseen",
+                      "PEARL, c_1:5: 1 of 2 goals, 0 of 1 unseen",
+                      "PEARL, c_1:15: 2 of 2 goals, 1 of 1 unseen"]
+    way = [line for line in figure.axes[0].lines if len(line.get_xdata()) == 3][1]
+    assert list(way.get_ydata()) == pytest.approx([0, 0.475, 0.95])
+    assert [patch.center[0] for patch in figure.axes[3].patches] == pytest.approx([1, 0, -1])
+
+
+def test_ways_survive_packing(tmp_path, robots):
+    path = str(tmp_path / "data/s.tar.xz")
+    pa.pack(path, "s", ["points"], robots[:1])
+    with pa.unpacked([path]) as top:
+        [run] = pr.load_runs(pr.find_folders([top])[0])
+    assert run.trajectories["test", 15][2].tolist() == [[0, 0], [-0.475, 0], [-0.95, 0]]
+
+
+@pytest.mark.parametrize("change, words", [
+    (lambda t: t.replace("meta,train,0,5,1", "meta,train,0,5,2", 1), "step is 2 but must be 1"),
+    (lambda t: t.replace("meta,train,0,0,0", "meta,train,7,0,0", 1), "no such policy, split, task"),
+    (lambda t: t.replace("personal,train,0,0", "personal,train,0,5", 1), "no such policy, split"),
+    (lambda t: t.replace("observation_0", "place", 1), "the column 'observation_0' is missing"),
+    (lambda t: t.replace(",0.5,", ",nan,").replace(",0.475,", ",nan,"), "is 'nan', not a finite"),
+])
+def test_malformed_ways_are_refused(tmp_path, robots, change, words):
+    path = edit(robots[0], "trajectories.csv", change)
+    message = fails(tmp_path)
+    assert path in message and words in message
+
+
+def test_a_goal_that_is_not_told_is_missed(tmp_path, robots):
+    edit(robots[0], "manifest.json", lambda t: t.replace("goal at (0.0, 1.0)", "somewhere"))
+    assert "task 1 does not say where its goal is" in fails(tmp_path, "--what", "trajectories")
 
 
 PLAN = """sweeps:

@@ -14,7 +14,7 @@ SMALL = ["train_tasks:=2", "test_tasks:=1", "rounds:=3", "evaluation_interval:=1
 METHODS = {
     "promp": ["steps_per_round:=500", "promp.hidden:=[8]", "promp.episodes:=4"],
     "maml_trpo": ["steps_per_round:=500", "maml_trpo.hidden:=[8]", "maml_trpo.episodes:=4"],
-    "rl2": ["steps_per_round:=500", "rl2.hidden:=8", "rl2.head:=[8]", "rl2.trials:=4"],
+    "rl2": ["steps_per_round:=500", "rl2.hidden:=8", "rl2.head:=[8]", "rl2.trials:=8"],
     "pearl": ["steps_per_round:=700", "pearl.hidden:=[8]", "pearl.context_hidden:=[8]",
               "pearl.warm_up_steps:=100", "pearl.prior_steps:=40", "pearl.posterior_steps:=40",
               "pearl.updates_per_iteration:=10"],

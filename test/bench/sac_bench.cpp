@@ -87,5 +87,25 @@ void SacUpdateWithEncoder(benchmark::State& state) {
 }
 BENCHMARK(SacUpdateWithEncoder)->Unit(benchmark::kMicrosecond);
 
+// what the same bits on every processor cost
+void SacUpdatePortable(benchmark::State& state) {
+  const auto units = static_cast<std::size_t>(state.range(0));
+  const auto batch = static_cast<std::size_t>(state.range(1));
+  SacUpdate update(units, batch, "none", true), native(units, batch, "none");
+  double fast = callSeconds(20, 1, native);
+  const double seconds = callSeconds(state, 1, update);
+  fast = std::min(fast, callSeconds(20, 1, native));
+  const std::string size = std::to_string(units);
+  report({Part::kLoops, units == 512 ? 13 : 14},
+         "SAC update, arithmetic portable, [" + size + "," + size + "], batch " +
+             std::to_string(batch),
+         Unit::kSeconds, seconds, fast, "arithmetic native");
+}
+BENCHMARK(SacUpdatePortable)
+    ->ArgNames({"units", "batch"})
+    ->Args({512, 256})
+    ->Args({128, 128})
+    ->Unit(benchmark::kMicrosecond);
+
 }  // namespace
 }  // namespace bench

@@ -54,8 +54,9 @@ inline double sacFlops(double h, double batch, double in, double action) {
 /// hidden layers of `units`, 25 observations, 6 actions. peers.py does the same in PyTorch.
 class SacUpdate {
  public:
-  SacUpdate(std::size_t units, std::size_t batch, const std::string& task_encoding)
-      : learner(std::make_unique<NoiseEnv>(25, 6), settings(units, batch, task_encoding)),
+  SacUpdate(std::size_t units, std::size_t batch, const std::string& task_encoding,
+            bool portable = false)
+      : learner(std::make_unique<NoiseEnv>(25, 6), settings(units, batch, task_encoding, portable)),
         rng(0, 0, pmeta::Stream::kSample),
         phi(learner.networks().size()),
         omega(phi),
@@ -94,8 +95,9 @@ class SacUpdate {
 
  private:
   static pmeta::SacSettings settings(std::size_t units, std::size_t batch,
-                                     const std::string& task_encoding) {
+                                     const std::string& task_encoding, bool portable) {
     pmeta::SacSettings settings;
+    settings.portable = portable;
     settings.hidden.assign(2, static_cast<int>(units));
     settings.batch_size = static_cast<int>(batch);
     settings.task_encoding = task_encoding;

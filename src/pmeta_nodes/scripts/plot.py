@@ -17,6 +17,7 @@ NEEDS = {"curves": "it has no finished run",
          "sweep": "no numeric setting of pMeta-RL differs between its runs",
          "tasks": "it has neither networks nor fresh episodes",
          "unseen": "it has neither test tasks nor an inference network",
+         "trajectories": "it has no run of sparse_point_robot with a trajectories.csv",
          "values": "it has no run of mountain_car or sparse_point_robot with policies",
          "convergence": "it has no finished convergence run"}
 FORMATS = ("png", "pdf")

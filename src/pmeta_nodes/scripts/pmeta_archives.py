@@ -15,7 +15,7 @@ import tempfile
 
 from pmeta_files import PlotError, read_json, read_text
 
-FILES = ("config.yaml", "final.csv", "manifest.json", "rounds.csv")
+FILES = ("config.yaml", "final.csv", "manifest.json", "rounds.csv", "trajectories.csv")
 COMMAND = "sweep.json"
 # where a run was written is of no use elsewhere
 PLACE = re.compile(r"^results_dir: .*$", re.M)

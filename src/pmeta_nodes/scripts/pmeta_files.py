@@ -18,6 +18,7 @@ HEADERS = ("round,task,split,policy,context_episodes,return_mean,return_std,epis
 FRESH_HEADERS = (
     "snapshot,round,policy,trained_task,task,split,return_mean,return_std,episodes",
     "snapshot,round,policy,trained_task,task,return_mean,return_std,episodes")
+PATH_COLUMNS = ("policy", "split", "task", "context_episodes", "step")
 SNAPSHOTS = ("best", "last")
 OWN_BEST = "own_best"
 WORD_COLUMNS = ("diversity", "step", "update")
@@ -147,6 +148,27 @@ def _fresh_names(snapshot, policy, split, own):
     if policy == "meta":
         return ["meta" if split == "train" else "meta_test"]
     return ["all"] * (snapshot != OWN_BEST) + ["personal"] * own
+
+
+def read_trajectories(path, tasks, tests):
+    """{key of pmeta_returns: {task: its observations, steps x size}} of a trajectories.csv."""
+    found = {}
+    for number, row in read_csv(path):
+        where = "%s line %d" % (path, number)
+        require_columns(path, row, PATH_COLUMNS + ("observation_0",))
+        task, count, step = (to_int(where, k, row[k]) for k in PATH_COLUMNS[2:])
+        policy, split = row["policy"], row["split"]
+        known = {"train": range(tasks), "test": range(tasks, tasks + tests)}.get(split, ())
+        if (policy not in ("personal", "meta") or task not in known or count < 0
+                or (policy == "personal" and (split, count) != ("train", 0))):
+            raise PlotError("%s: there is no such policy, split, task or context_episodes." % where)
+        path_of_task = found.setdefault(key_of(policy, split, count), {}).setdefault(task, [])
+        if step != len(path_of_task):
+            raise PlotError("%s: step is %d but must be %d." % (where, step, len(path_of_task)))
+        path_of_task.append([to_number(where, name, value) for name, value in row.items()
+                             if name not in PATH_COLUMNS])
+    return {key: {task: np.array(rows) for task, rows in by_task.items()}
+            for key, by_task in found.items()}
 
 
 def read_text(path):

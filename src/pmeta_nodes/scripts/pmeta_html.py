@@ -77,6 +77,8 @@ CAPTIONS = (
     ("tasks_last", "Returns task by task; a task that is stuck shows, which a mean hides."),
     ("_unseen_tasks", "The meta-policy on training tasks and on test tasks, which nobody trained "
      "on, before and after adaptation from exploration episodes, as far as there are any."),
+    ("trajectories", "One episode of each policy on each task: of personal policies on their own, of "
+     "meta-policies after so many exploration episodes. Full lines end within the goal's radius."),
     ("value_maps", "What each policy takes a state to be worth (colour), and greedy episodes from "
      "three starts at rest (lines; the titles count their steps). Optimal: value iteration."),
     ("action_values", "What each policy takes its first action to be worth (colour, from each "

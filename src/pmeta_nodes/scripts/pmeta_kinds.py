@@ -5,10 +5,11 @@ import pmeta_convergence as pc
 import pmeta_drawing as pd
 import pmeta_figures as pf
 import pmeta_method_curves as pm
+import pmeta_trajectories as pt
 import pmeta_unseen as pu
 import pmeta_value_maps as pv
 
-KINDS = ("curves", "comparison", "sweep", "tasks", "unseen", "values", "convergence")
+KINDS = ("curves", "comparison", "sweep", "tasks", "unseen", "trajectories", "values", "convergence")
 
 
 def draw(experiments, convergence, kinds, figures):
@@ -20,6 +21,8 @@ def draw(experiments, convergence, kinds, figures):
         if "unseen" in kinds:
             pu.draw_unseen(experiments, figures["unseen"])
             pm.draw_unseen_methods(experiments, figures["unseen"])
+        if "trajectories" in kinds:
+            pt.draw_trajectories(experiments, figures["trajectories"])
         if "values" in kinds:
             pv.draw_value_maps(experiments, figures["values"])
             pa.draw_action_values(experiments, figures["values"])

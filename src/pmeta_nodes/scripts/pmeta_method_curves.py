@@ -81,7 +81,8 @@ def draw_method(axis, method, key, word, count):
     label = pm.policy_name(word, method)
     if not isinstance(key, str) and method.explores and key[1] != count:
         label += ", after %d episodes" % key[1]
-    style = look_of(method, word)
+    # by distance on the paper: a logarithmic axis presses the last ones together
+    style = dict(look_of(method, word), markevery=0.08)
     draw_curve(axis, method.group, key, label, x=method.group.total_steps, **style)
     axis.axhline(method.group.final(key).mean(), color=style["color"], linestyle=":", linewidth=1.1,
                  zorder=1.5)

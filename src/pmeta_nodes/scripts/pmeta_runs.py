@@ -11,7 +11,7 @@ import re
 import numpy as np
 
 from pmeta_files import (PlotError, read_columns, read_fresh, read_json, read_rounds, read_text,
-                         shown, warn)
+                         read_trajectories, shown, warn)
 from pmeta_manifest import figures_of, settings_of
 from pmeta_returns import split_of, with_stand_ins, words_of
 
@@ -92,6 +92,9 @@ class Run:
         path = os.path.join(folder, "final.csv")
         self.fresh = (read_fresh(path, self.num_tasks, self.num_tests) if os.path.isfile(path)
                       else {})
+        path = os.path.join(folder, "trajectories.csv")
+        self.trajectories = (read_trajectories(path, self.num_tasks, self.num_tests)
+                             if os.path.isfile(path) else {})
 
     def tasks_of(self, key):
         """Numbers of the tasks that these returns are of; the test tasks follow the others."""

@@ -64,7 +64,7 @@ TEST(Maml, CountsStepsOfEachTaskBeforeAndAfterTheInnerStep) {
   const IterationStats stats = learner.iterate(1, 0);
   EXPECT_EQ(stats.env_steps, (std::vector<std::int64_t>(2, 2 * 2 * 3 * 20)));
   EXPECT_EQ(stats.updates, 1);
-  EXPECT_STREQ(learner.losses()[0].name, "return after the inner step");
+  EXPECT_EQ(learner.losses()[0].name, "return after the inner step");
 }
 
 TEST(Maml, ThreadsChangeNothing) {

@@ -132,6 +132,18 @@ TEST(MetaTrainer, TheSameRoundAgainGivesTheSameUpdate) {
   EXPECT_FALSE(first->personal);
 }
 
+TEST(MetaTrainer, WithoutAStateItGoesOnFromTheMetaPolicy) {
+  const Experiment experiment = points();
+  MetaTrainer trainer(experiment);
+  MetaPolicy meta;
+  meta.model = experiment.initialModel();
+  meta.round = 2;
+  EXPECT_EQ(trainer.evaluateMeta(meta)[0].env_steps, 0);
+  EXPECT_EQ(trainer.trainRound(meta)->env_steps, 480);  // those of one round
+  meta.round = 3;
+  EXPECT_EQ(trainer.evaluateMeta(meta)[0].env_steps, 160);
+}
+
 TEST(MetaTrainer, StopsInTheMiddleOfARound) {
   const Experiment experiment = points();
   MetaTrainer trainer(experiment);

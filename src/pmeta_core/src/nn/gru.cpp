@@ -6,15 +6,10 @@
 #include <utility>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/nn/held_signals.h"
 #include "pmeta_core/nn/kernels.h"
 
 namespace pmeta {
-namespace {
-
-// below this dot products beat a matrix product, which first copies its factors
-constexpr std::size_t kFewRows = 2;
-
-}  // namespace
 
 GruWorkspace::GruWorkspace(const Gru& gru, std::size_t max_rows, std::size_t max_batch)
     : max_rows_(max_rows),
@@ -22,6 +17,7 @@ GruWorkspace::GruWorkspace(const Gru& gru, std::size_t max_rows, std::size_t max
       gates_(max_rows * 4 * gru.units()),
       previous_(max_rows * gru.units()),
       hidden_(max_rows * gru.units()),
+      transposed_(3 * gru.units() * gru.units()),
       recurrent_(max_batch * 3 * gru.units()),
       carried_(max_batch * gru.units()),
       next_carried_(carried_.size()),
@@ -62,7 +58,15 @@ const float* Gru::unroll(const float* parameters, const float* input,
     throw Error("an unroll needs its sequences longest first.");
   }
   workspace.batches_ = batches;
-  forward(parameters, input, initial, workspace);
+  // few rows at a time: the product is faster on a weight that it need not transpose each time
+  const std::size_t units = spec_.units;
+  const float* weight = parameters + weight_hh_;
+  for (std::size_t row = 0; row < 3 * units; ++row) {
+    for (std::size_t k = 0; k < units; ++k) {
+      workspace.transposed_[k * 3 * units + row] = weight[row * units + k];
+    }
+  }
+  forward(parameters, input, initial, Transpose::kNo, workspace);
   return workspace.hidden_.data();
 }
 
@@ -74,27 +78,24 @@ void Gru::step(const float* parameters, const float* input, std::size_t batch, f
                 std::to_string(workspace.max_batch_) + ".");
   }
   workspace.batches_.assign(1, batch);
-  forward(parameters, input, hidden, workspace);
+  forward(parameters, input, hidden, Transpose::kYes, workspace);
   std::copy_n(workspace.hidden_.data(), batch * spec_.units, hidden);
 }
 
-// y <- x W^T + bias, with `stride` floats from one row of y to the next
-void Gru::linear(const float* x, std::size_t rows, std::size_t inputs, const float* weight,
-                 const float* bias, std::size_t outputs, float* y, std::size_t stride) const {
-  if (rows <= kFewRows) {
-    for (std::size_t b = 0; b < rows; ++b) {
-      kernels().affine(x + b * inputs, weight, bias, y + b * stride, 1, inputs, outputs, false);
-    }
-    return;
-  }
+// y <- x op(W) + bias, with `stride` floats from one row of y to the next
+void Gru::linear(const float* x, std::size_t rows, std::size_t inputs, Transpose transpose,
+                 const float* weight, const float* bias, std::size_t outputs, float* y,
+                 std::size_t stride) const {
   for (std::size_t b = 0; b < rows; ++b) std::copy_n(bias, outputs, y + b * stride);
-  product_(Transpose::kNo, Transpose::kYes, rows, outputs, inputs, 1, x, inputs, weight, inputs, 1,
-           y, stride);
+  product_(Transpose::kNo, transpose, rows, outputs, inputs, 1, x, inputs, weight,
+           transpose == Transpose::kYes ? inputs : outputs, 1, y, stride);
 }
 
+// `recurrent`: kYes takes weight_hh as it is, kNo what is transposed in the workspace
 void Gru::forward(const float* parameters, const float* input, const float* initial,
-                  GruWorkspace& workspace) const {
+                  Transpose recurrent, GruWorkspace& workspace) const {
   const std::size_t units = spec_.units, inputs = spec_.inputs;
+  const HeldSignals held;  // once, not for every product
   const std::vector<std::size_t>& batches = workspace.batches_;
   const std::size_t rows = std::accumulate(batches.begin(), batches.end(), std::size_t{0});
   const float *bias_ih = parameters + bias_ih_, *bias_hh = parameters + bias_hh_;
@@ -102,17 +103,20 @@ void Gru::forward(const float* parameters, const float* input, const float* init
   // what the inputs give, of all steps at once; n goes before r and z, so that r, z, q, which the
   // hidden state acts through, lie together
   float* gates = workspace.gates_.data();
-  linear(input, rows, inputs, parameters, bias_ih, 2 * units, gates + units, 4 * units);
-  linear(input, rows, inputs, parameters + 2 * units * inputs, bias_ih + 2 * units, units, gates,
+  linear(input, rows, inputs, Transpose::kYes, parameters, bias_ih, 2 * units, gates + units,
          4 * units);
+  linear(input, rows, inputs, Transpose::kYes, parameters + 2 * units * inputs, bias_ih + 2 * units,
+         units, gates, 4 * units);
 
+  const float* weight_hh =
+      recurrent == Transpose::kYes ? parameters + weight_hh_ : workspace.transposed_.data();
   float* previous = workspace.previous_.data();
   float* hidden = workspace.hidden_.data();
   const float* last = initial;
   for (const std::size_t batch : batches) {
     const std::size_t n = batch * units;
     last == nullptr ? std::fill_n(previous, n, 0.0f) : std::copy_n(last, n, previous);
-    linear(previous, batch, units, parameters + weight_hh_, bias_hh, 3 * units,
+    linear(previous, batch, units, recurrent, weight_hh, bias_hh, 3 * units,
            workspace.recurrent_.data(), 3 * units);
     kernels().gruForward(gates, workspace.recurrent_.data(), previous, hidden, batch, units);
     last = hidden;
@@ -125,6 +129,7 @@ void Gru::forward(const float* parameters, const float* input, const float* init
 void Gru::backward(const float* parameters, const float* input, const float* d_hidden,
                    float* gradient, float* d_input, float* d_initial,
                    GruWorkspace& workspace) const {
+  const HeldSignals held;
   backwardThroughTime(parameters, d_hidden, workspace);
   const std::size_t units = spec_.units, inputs = spec_.inputs, stride = 4 * units;
   const std::vector<std::size_t>& batches = workspace.batches_;

@@ -60,7 +60,13 @@ std::optional<RoundResult> MetaTrainer::trainRound(const MetaPolicy& meta,
 
   between_ = false;
   learner_->setModel(meta.model);
-  const Totals before = totals_.at(round_);
+  if (meta.round != round_) {
+    const Totals none{std::vector<std::int64_t>(totals_.begin()->second.env_steps.size()), 0, 0};
+    totals_ = {{meta.round, none}};
+    iterations_ = static_cast<std::uint64_t>(meta.round) << 32;  // draws that were not made before
+    surplus_ = 0;
+  }
+  const Totals before = totals_.at(meta.round);
   Totals totals = before;
   if (!guarded(round, [&] { return train(round, keep_going, totals); })) return std::nullopt;
 
@@ -84,7 +90,7 @@ std::optional<RoundResult> MetaTrainer::trainRound(const MetaPolicy& meta,
 
 // the iterations up to the round's end; false if stopped
 bool MetaTrainer::train(int round, const KeepGoing& keep_going, Totals& totals) {
-  const std::int64_t goal = round * steps_per_round_;
+  const std::int64_t goal = totals.steps() - surplus_ + steps_per_round_;
   while (totals.steps() < goal) {
     const IterationStats stats = learner_->iterate(seed_, iterations_++);
     for (std::size_t k = 0; k < totals.env_steps.size(); ++k) {
@@ -101,6 +107,7 @@ bool MetaTrainer::train(int round, const KeepGoing& keep_going, Totals& totals) 
     const std::int64_t done = totals.steps() - goal + steps_per_round_;
     if (keep_going && !keep_going(std::min(done, steps_per_round_))) return false;
   }
+  surplus_ = totals.steps() - goal;
   return true;
 }
 
@@ -180,11 +187,13 @@ std::vector<TaskReturn> MetaTrainer::evaluateTask(int task, const MetaPolicy& me
   return results;
 }
 
-// of the training since the last scheduled evaluation
+// of the training since the last scheduled evaluation, as far as it is known
 void MetaTrainer::addCosts(TaskReturn& result) const {
   if (result.split != Split::kTrain) return;
-  const Totals& now = totals_.at(result.round);
-  const Totals& before = totals_.at(evaluatedBefore(result.round));
+  const auto found = totals_.find(result.round);
+  if (found == totals_.end()) return;
+  const Totals& now = found->second;
+  const Totals& before = totals_.lower_bound(evaluatedBefore(result.round))->second;
   const auto task = static_cast<std::size_t>(result.task);
   result.env_steps = now.env_steps[task] - before.env_steps[task];
   result.updates = now.updates - before.updates;
@@ -212,6 +221,7 @@ void MetaTrainer::saveState(StateWriter& writer) const {
   }
   writer.count("round", round_);
   writer.count("iterations", static_cast<std::int64_t>(iterations_));
+  writer.count("surplus", surplus_);
   writer.count("broken_episodes", broken_episodes_);
   writer.count("oldest_totals", totals_.begin()->first);
   for (const auto& [round, totals] : totals_) {
@@ -225,6 +235,7 @@ void MetaTrainer::saveState(StateWriter& writer) const {
 void MetaTrainer::loadState(StateReader& reader) {
   round_ = static_cast<int>(reader.count("round", 0, evaluations_.rounds));
   iterations_ = static_cast<std::uint64_t>(reader.count("iterations"));
+  surplus_ = reader.count("surplus");
   broken_episodes_ = reader.count("broken_episodes");
   const auto oldest = static_cast<int>(reader.count("oldest_totals", 0, round_));
   totals_.clear();

@@ -195,6 +195,8 @@ void PartyNode::evaluate(const pmeta::MetaPolicy& meta) {
 void PartyNode::trainFrom(const pmeta::MetaPolicy& meta) {
   const int rounds = experiment_.settings().rounds;
   waitForAggregator();
+  // first: what an evaluation tells may depend on what was trained
+  if (party_->trains()) returnTo(meta);
   evaluate(meta);
   if (meta.round >= rounds) {
     setState(AgentStatus::DONE, "all " + std::to_string(rounds) + " rounds are done");
@@ -207,7 +209,6 @@ void PartyNode::trainFrom(const pmeta::MetaPolicy& meta) {
   }
 
   const int round = meta.round + 1;
-  returnTo(meta);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_.round = static_cast<std::uint32_t>(round);

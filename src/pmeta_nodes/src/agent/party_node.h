@@ -36,19 +36,20 @@ namespace pmeta_nodes {
 /// and the topics around it.
 ///
 /// Subscribes to meta_policy and round; publishes auxiliary, returns, agent_status and
-/// task_<i>/trajectory, the latter two for each of its tasks. What the aggregator must get is sent
+/// task_I/trajectory, the latter two for each of its tasks. What the aggregator must get is sent
 /// again until a newer meta-policy, or the end of the run, shows that it has it. With a key_file,
 /// what it sends is signed and what is not authentic it ignores. A checkpoint is on the disk before
 /// that round's update is sent, so an agent that is killed comes back with all that anybody has
 /// seen of it; where the aggregator had to go back some rounds, the agent follows. Training that
 /// cannot go on (TaskFailed) is told by the state FAILED until the run has ended: the same would
 /// come of it if it were started again. The last round's personal policy stays on this machine, as
-/// policies/task_<i>.safetensors of the run folder.
+/// policies/task_I.safetensors of the run folder.
 class PartyNode {
  public:
+  /// Gives the party as it is before round 1.
   using MakeParty = std::function<std::unique_ptr<pmeta::Party>()>;
 
-  /// make: gives the party as it is before round 1. name: of its health. resume: begin with the
+  /// name: of its health. resume: begin with the
   /// newest checkpoint in the run folder, if there is one.
   PartyNode(const pmeta::Experiment& experiment, MakeParty make, const std::string& name,
             bool resume);

@@ -9,8 +9,8 @@ namespace pmeta {
 
 /// Return of a policy that was given some exploration episodes to find out about the task.
 struct AdaptedReturn {
-  int context_episodes = 0;  ///< how many; 0: before any
-  ReturnStats stats;
+  int context_episodes = 0;            ///< how many; 0: before any
+  ReturnStats stats;                   ///< over one episode in each evaluation environment
   std::vector<float> task_input = {};  ///< what it was told of the task then
 };
 

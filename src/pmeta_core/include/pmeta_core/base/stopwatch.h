@@ -7,6 +7,7 @@ namespace pmeta {
 /// Wall time since it was made.
 class Stopwatch {
  public:
+  /// So far.
   double seconds() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }

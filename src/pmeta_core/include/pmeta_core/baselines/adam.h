@@ -11,13 +11,16 @@ namespace pmeta {
 /// float32 one.
 class Adam {
  public:
+  /// Of `size` parameters.
   Adam(std::size_t size, double learning_rate)
       : learning_rate_(learning_rate), first_(size), second_(size) {}
 
   /// One step down the gradient [size].
   void step(double* parameters, const double* gradient);
 
+  /// Moments and count of steps.
   void saveState(StateWriter& writer) const;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader);
 
  private:

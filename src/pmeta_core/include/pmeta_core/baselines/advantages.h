@@ -11,6 +11,7 @@ struct Path {
   std::vector<double> rewards;           ///< [steps]
   std::vector<double> last_observation;  ///< after the last step
   bool terminated = false;               ///< in a terminal state; else the horizon was reached
+  /// Its length.
   std::size_t steps() const { return rewards.size(); }
 };
 
@@ -32,6 +33,7 @@ class LinearBaseline {
   /// Of an observation at step `t`.
   double value(const double* observation, std::size_t observation_size, std::size_t t) const;
 
+  /// c of f . c, [features]; none before fit().
   const std::vector<double>& coefficients() const { return coefficients_; }
 
  private:
@@ -40,8 +42,8 @@ class LinearBaseline {
 
 /// How advantages are estimated (Schulman et al., "Generalized Advantage Estimation", 2016).
 struct AdvantageSettings {
-  double gamma = 0.99;
-  double lambda = 1;  ///< of the exponentially weighted sum; 1: return minus baseline
+  double gamma = 0.99;  ///< discount
+  double lambda = 1;    ///< of the exponentially weighted sum; 1: return minus baseline
   /// Past the last step of an episode that reached its horizon the baseline goes on; else nothing
   /// is worth anything there, as befits one that knows the time.
   bool bootstrap = false;

@@ -26,20 +26,23 @@ class GaussianMlp {
 
   /// What a forward pass leaves for those behind it.
   struct Pass {
-    std::size_t rows = 0;
+    std::size_t rows = 0;                          ///< of the batch
     std::vector<std::vector<double>> activations;  ///< input of each layer; then the mean
     const std::vector<double>& mean() const { return activations.back(); }  ///< [rows, actions]
   };
 
   /// R{.} of a Pass.
   struct Tangent {
-    std::vector<std::vector<double>> activations;
-    const std::vector<double>& mean() const { return activations.back(); }
+    std::vector<std::vector<double>> activations;  ///< as those of the Pass
+    const std::vector<double>& mean() const { return activations.back(); }  ///< [rows, actions]
   };
 
+  /// Numbers of an observation.
   std::size_t inputs() const { return layers_.front().inputs; }
+  /// Numbers of an action.
   std::size_t actions() const { return layers_.back().outputs; }
   std::size_t size() const { return size_; }  ///< number of parameters
+  /// Where log sigma begins among the parameters.
   std::size_t logStdOffset() const { return size_ - actions(); }
   const std::vector<Block>& blocks() const { return blocks_; }  ///< "policy.layer0.weight", ...
 

@@ -16,7 +16,9 @@ class GaussianMlpActor : public Actor {
   GaussianMlpActor(const GaussianMlp& policy, double scale, std::vector<double> parameters,
                    std::size_t max_batch);
 
+  /// Acts by these from now on.
   void use(std::vector<double> parameters) { parameters_ = std::move(parameters); }
+  /// That it acts by.
   const std::vector<double>& parameters() const { return parameters_; }
 
   void look(const float* observations, const std::vector<std::size_t>& envs) override;
@@ -25,6 +27,7 @@ class GaussianMlpActor : public Actor {
  protected:
   /// Writes u of the row-th environment looked at into what `u` will be acted by.
   virtual void draw(const double* mean, Rng& rng, double* u);
+  /// What the parameters are of.
   const GaussianMlp& policy() const { return policy_; }
 
  private:
@@ -39,10 +42,13 @@ class GaussianMlpActor : public Actor {
 /// Policies of a GaussianMlp, which act by its mean.
 class GaussianMlpPolicies : public PolicyFamily {
  public:
+  /// `log_std`: to begin with. `scale`: see GaussianMlpActor. Throws Error if actions are discrete.
   GaussianMlpPolicies(const EnvSpec& env, const std::vector<int>& hidden, double log_std,
                       double scale);
 
+  /// What the parameters are of.
   const GaussianMlp& network() const { return network_; }
+  /// What divides u.
   double scale() const { return scale_; }
 
   PolicyForm form() const override;

@@ -8,8 +8,8 @@ namespace pmeta {
 
 /// One task's episodes before and after the inner step.
 struct InnerStepData {
-  ActionData before;
-  ActionData after;
+  ActionData before;  ///< by theta
+  ActionData after;   ///< by theta_i
 };
 
 /// theta - alpha * gradient of `kind` on `data` at theta, into `adapted`: MAML's inner step.
@@ -31,10 +31,12 @@ class InnerStepObjective {
 
   /// Adapts `theta` [size], which must stay until the next call, to each task.
   void at(const double* theta);
+  /// theta_i of a task, [size].
   const std::vector<double>& adapted(std::size_t task) const { return tasks_[task].adapted; }
 
   /// Of the data after the step, by theta_i.
   double loss(Surrogate kind, double clip = 0) const;
+  /// Its gradient by theta, through the inner steps.
   void gradient(Surrogate kind, double* gradient, double clip = 0) const;
   /// Mean of KL(pi_old || pi_theta_i) there.
   double kl() const;
@@ -45,6 +47,7 @@ class InnerStepObjective {
 
   /// Mean of KL(pi_old || pi_theta) on the data before the step, by task, and its gradient.
   std::vector<double> innerKl() const;
+  /// The gradient of its mean over tasks by theta.
   void innerKlGradient(double* gradient) const;
 
   /// r of a row of a task's data after the step.

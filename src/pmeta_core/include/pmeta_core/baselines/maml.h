@@ -18,9 +18,9 @@ struct MamlSettings {
   double action_scale = 10;            ///< an environment is given clip(u / action_scale, -1, 1)
   int meta_batch = 0;  ///< adaptations of an iteration, a multiple of the tasks; 0: one each
   int episodes = 10;   ///< of each of them, before its inner step and again after it
-  double inner_learning_rate = 0.1;
-  std::string inner_loss = "ratio";  ///< or "log_likelihood"
-  AdvantageSettings advantages;
+  double inner_learning_rate = 0.1;                 ///< alpha of the inner step
+  std::string inner_loss = "ratio";                 ///< or "log_likelihood"
+  AdvantageSettings advantages;                     ///< of both batches
   std::vector<int> exploration_episodes = {2, 20};  ///< evaluated after the step on so many
   int evaluation_episodes = 5;                      ///< episodes of one evaluation, by the mean
 };
@@ -39,6 +39,7 @@ GaussianMlpPolicies policiesOf(const EnvSpec& env, const MamlSettings& maml);
 /// ones, and moves the parameters so that adapting them pays; how, the derived methods say.
 class Maml : public MetaLearner {
  public:
+  /// Throws Error if actions are discrete.
   Maml(const MetaTasks& tasks, const MamlSettings& settings);
 
   const PolicyFamily& policies() const override { return policies_; }
@@ -48,6 +49,7 @@ class Maml : public MetaLearner {
   const std::vector<Loss>& losses() const override { return losses_; }
   std::unique_ptr<Adaptation> adapt(const Model& policy, int task) const override;
   void saveState(StateWriter& writer) const override;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader) override;
 
  protected:
@@ -55,6 +57,7 @@ class Maml : public MetaLearner {
   /// updates, and writes what is to be told of them into `losses` behind what is there.
   virtual std::int64_t metaStep(InnerStepObjective& objective, std::vector<double>& theta,
                                 std::vector<Loss>& losses) = 0;
+  /// What theta is of.
   const GaussianMlp& policy() const { return policies_.network(); }
 
  private:

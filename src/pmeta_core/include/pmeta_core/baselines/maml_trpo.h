@@ -7,8 +7,8 @@ namespace pmeta {
 
 /// Settings of MAML-TRPO.
 struct MamlTrpoSettings {
-  MamlSettings maml;
-  TrustRegionSettings trust_region;
+  MamlSettings maml;                 ///< of sampling and inner step
+  TrustRegionSettings trust_region;  ///< of the step of theta
 };
 
 /// Binds all of them below `prefix`, e.g. "maml_trpo.".
@@ -18,6 +18,7 @@ void bind(Settings& settings, const std::string& prefix, MamlTrpoSettings& maml)
 /// policies after the inner step goes down, as far as their KL from those that sampled allows.
 class MamlTrpo : public Maml {
  public:
+  /// As Maml.
   MamlTrpo(const MetaTasks& tasks, const MamlTrpoSettings& settings);
 
  private:

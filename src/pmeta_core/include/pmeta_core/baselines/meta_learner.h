@@ -55,12 +55,13 @@ class MetaLearner {
 
   /// All but the model that later iterations depend on, between two of them.
   virtual void saveState(StateWriter& writer) const = 0;
+  /// Refuses what no saveState() of one with these settings gives.
   virtual void loadState(StateReader& reader) = 0;
 };
 
 /// What a meta-learner is made for: the tasks of an experiment.
 struct MetaTasks {
-  std::shared_ptr<const EnvFamily> family;
+  std::shared_ptr<const EnvFamily> family;  ///< whose first numTasks() are trained on
   std::int64_t total_steps = 0;  ///< transitions of the whole run, over all training tasks
   int threads = 1;               ///< that may act in environments at the same time
 
@@ -112,7 +113,7 @@ struct MetaLearnerRow {
   std::string label;     ///< for figures and tables, e.g. "PEARL"
   std::string meaning;   ///< a clause, for the list of settings
   std::string policies;  ///< what policy files hold, for scripts: see manifest.h
-  std::function<std::unique_ptr<MetaLearnerKind>()> make;
+  std::function<std::unique_ptr<MetaLearnerKind>()> make;  ///< one with default settings
 };
 
 /// Every kind of meta-learner, by the name that `algorithm` gives.
@@ -123,6 +124,7 @@ Registry<MetaLearnerRow>& metaLearners();
 ///     const RegisteredMetaLearner<PearlKind> kPearl("pearl", "PEARL", "what it does", "...");
 template <class Kind>
 struct RegisteredMetaLearner : Registered<MetaLearnerRow> {
+  /// As in MetaLearnerRow.
   RegisteredMetaLearner(const std::string& name, const std::string& label,
                         const std::string& meaning, const std::string& policies)
       : Registered(metaLearners(), name,

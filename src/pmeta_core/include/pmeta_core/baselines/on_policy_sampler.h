@@ -13,6 +13,7 @@ namespace pmeta {
 /// Acts by samples of a GaussianMlp and keeps what came of it: paths, and u as it was drawn.
 class RecordingActor : public GaussianMlpActor {
  public:
+  /// As GaussianMlpActor.
   RecordingActor(const GaussianMlp& policy, double scale, std::vector<double> parameters,
                  std::size_t max_batch);
 
@@ -59,7 +60,9 @@ class OnPolicySampler {
   double meanReturn() const { return mean_return_; }
   std::int64_t brokenEpisodes() const { return rollout_.broken().count(); }  ///< in all
 
+  /// The count of episodes that broke down.
   void saveState(StateWriter& writer) const { writer.part("broken", rollout_.broken()); }
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader) { reader.part("broken", rollout_.broken()); }
 
  private:

@@ -36,12 +36,15 @@ class Pearl : public MetaLearner {
   const std::vector<Loss>& losses() const override { return losses_; }
   std::unique_ptr<Adaptation> adapt(const Model& policy, int task) const override;
   void saveState(StateWriter& writer) const override;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader) override;
 
   /// One update of an iteration, on what there is after its steps. Allocates nothing.
   SacLosses update(Rng& rng);
 
+  /// The i-th training task with its data.
   const PearlCollector& task(std::size_t i) const { return *tasks_[i]; }
+  /// What the parameters are of.
   const SacNetworks& networks() const { return policies_.networks(); }
 
  private:

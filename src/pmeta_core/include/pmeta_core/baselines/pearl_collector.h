@@ -35,11 +35,16 @@ class PearlCollector : private Actor {
   std::int64_t visit(const float* parameters, std::int64_t prior_steps,
                      std::int64_t posterior_steps, Rng& rng);
 
+  /// All transitions that are kept.
   const ReplayBuffer& replay() const { return replay_; }
+  /// Those of the last visit that tell the task.
   const ContextStore& context() const { return context_; }
+  /// In all.
   std::int64_t brokenEpisodes() const { return rollout_.broken().count(); }
 
+  /// Replay, context and the count of broken episodes.
   void saveState(StateWriter& writer) const;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader);
 
  private:

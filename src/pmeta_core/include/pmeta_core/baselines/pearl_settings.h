@@ -12,7 +12,7 @@ namespace pmeta {
 struct PearlSettings {
   PearlSettings();
 
-  SacSettings sac;
+  SacSettings sac;                   ///< of networks, update and context
   double learning_rate = 1e-3;       ///< Adam's, of all networks
   int meta_batch = 4;                ///< tasks of one update, drawn with repetition
   int task_batch = 64;               ///< transitions of each in it

@@ -17,10 +17,10 @@ namespace pmeta {
 struct PooledSacSettings {
   PooledSacSettings();
 
-  SacSettings sac;              ///< env_steps_per_update: of an iteration, on each task
-  double learning_rate = 1e-3;  ///< Adam's, of all networks
-  int updates_per_iteration = 100;
-  bool gradient_surgery = false;  ///< between the tasks: see operate()
+  SacSettings sac;                  ///< env_steps_per_update: of an iteration, on each task
+  double learning_rate = 1e-3;      ///< Adam's, of all networks
+  int updates_per_iteration = 100;  ///< after its steps
+  bool gradient_surgery = false;    ///< between the tasks: see operate()
 };
 
 /// Binds all of them below `prefix`, e.g. "pooled_sac.".
@@ -45,6 +45,7 @@ class PooledSac : public MetaLearner {
   /// It does not explore: it is told the task, or acts alike on all.
   std::unique_ptr<Adaptation> adapt(const Model& policy, int task) const override;
   void saveState(StateWriter& writer) const override;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader) override;
 
  private:

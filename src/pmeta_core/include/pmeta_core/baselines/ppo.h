@@ -22,13 +22,13 @@ double logDensity(const float* action, const float* mean, const float* log_std,
 
 /// Steps as they were acted, and what was made of them.
 struct PpoBatch {
-  std::size_t steps, action_size;
-  const float* actions;  ///< [steps, action_size], not clipped
-  // all [steps], of the policy that acted where they say old
-  const float* old_log_densities;
-  const float* old_values;
-  const float* advantages;
-  const float* returns;  ///< that the values are to foretell
+  std::size_t steps;               ///< of all its episodes
+  std::size_t action_size;         ///< numbers of an action
+  const float* actions;            ///< [steps, action_size], not clipped
+  const float* old_log_densities;  ///< [steps], by the policy that acted
+  const float* old_values;         ///< [steps], by the critic of then
+  const float* advantages;         ///< [steps]
+  const float* returns;            ///< [steps], that the values are to foretell
 };
 
 /// Where gradients by the outputs of policy and critic go.
@@ -46,6 +46,7 @@ struct PpoLoss {
   double kl = 0;       ///< mean of log old density - log density
   double clipped = 0;  ///< share of steps whose ratio has left the interval
 
+  /// What is minimised.
   double total(const PpoSettings& settings) const {
     return policy + settings.value_coefficient * value - settings.entropy_coefficient * entropy;
   }

@@ -7,8 +7,8 @@ namespace pmeta {
 
 /// Settings of ProMP.
 struct ProMpSettings {
-  MamlSettings maml;
-  double clip = 0.3;
+  MamlSettings maml;             ///< of sampling and inner step
+  double clip = 0.3;             ///< of the likelihood ratio after it
   double learning_rate = 1e-3;   ///< Adam's
   int meta_steps = 5;            ///< of Adam, an iteration
   double kl_coefficient = 5e-4;  ///< eta, of the KL before the inner step
@@ -26,9 +26,11 @@ void bind(Settings& settings, const std::string& prefix, ProMpSettings& promp);
 /// the inner step is made again from the current theta before each.
 class ProMp : public Maml {
  public:
+  /// As Maml.
   ProMp(const MetaTasks& tasks, const ProMpSettings& settings);
 
   void saveState(StateWriter& writer) const override;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader) override;
 
  private:

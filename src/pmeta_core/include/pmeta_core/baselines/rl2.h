@@ -31,6 +31,7 @@ class Rl2 : public MetaLearner {
   const std::vector<Loss>& losses() const override { return losses_; }
   std::unique_ptr<Adaptation> adapt(const Model& policy, int task) const override;
   void saveState(StateWriter& writer) const override;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader) override;
 
  private:

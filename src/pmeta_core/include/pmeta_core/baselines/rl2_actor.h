@@ -22,13 +22,15 @@ struct TrialMemory {
   bool begun = false;    ///< has there been a step?
 };
 
-/// Acts by a policy of RL². A step that breaks its episode down leaves no trace in its memory.
+/// Acts by a policy of RL² in environments 0 to max_batch - 1. A step that breaks its episode down
+/// leaves no trace in its memory.
 class Rl2Actor : public Actor {
  public:
+  /// The mean of its distribution, which draws nothing, or a sample.
   enum class By { kMean, kSample };
 
-  /// All episodes in one environment are one trial. In up to `max_batch` environments at once; the
-  /// networks must outlive the actor, as `parameters` must.
+  /// All episodes in one environment are one trial. The networks must outlive the actor, as
+  /// `parameters` must.
   Rl2Actor(const Rl2Networks& networks, const float* parameters, std::size_t max_batch, By by);
 
   /// Acts by the mean, and each episode goes on from a copy of `start`.
@@ -38,6 +40,7 @@ class Rl2Actor : public Actor {
   /// A trial begins in every environment.
   void forget();
 
+  /// Of the trial in environment `env` so far.
   const TrialMemory& memory(std::size_t env) const { return memories_[env]; }
 
   void begin(std::size_t env, Rng& rng) override;
@@ -66,6 +69,7 @@ class Rl2Adaptation : public Adaptation {
   /// `parameters` stay as they are; they and the networks must outlive this.
   Rl2Adaptation(const Rl2Networks& networks, const float* parameters);
 
+  /// Of the exploration so far.
   const TrialMemory& memory() const { return acting_.memory(0); }
 
   void beginEpisode(Rng&) override {}

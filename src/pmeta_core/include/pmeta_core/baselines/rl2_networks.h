@@ -25,19 +25,29 @@ class Rl2Networks {
   /// Throws Error where actions are discrete.
   Rl2Networks(const EnvSpec& env, const Rl2Settings& settings);
 
+  /// Numbers of an observation.
   std::size_t observationSize() const { return observation_size_; }
+  /// Numbers of an action.
   std::size_t actionSize() const { return action_size_; }
   std::size_t lastSize() const { return action_size_ + 2; }  ///< of a, r, d
 
   const Gru& gru() const { return gru_; }  ///< its parameters begin at 0
+  /// From hidden state to the mean of u.
   const Mlp& mean() const { return mean_; }
+  /// From hidden state to the value.
   const Mlp& value() const { return value_; }
+  /// Where the parameters of mean() begin.
   std::size_t meanOffset() const { return gru_.size(); }
+  /// Where those of value() begin.
   std::size_t valueOffset() const { return meanOffset() + mean_.size(); }
+  /// Where the log std begin.
   std::size_t logStdOffset() const { return valueOffset() + value_.size(); }
+  /// Number of all parameters.
   std::size_t size() const { return logStdOffset() + action_size_; }
 
+  /// Of all, in order.
   std::vector<Block> blocks() const;
+  /// Weights as the settings say, biases 0.
   void initialise(float* parameters, Rng& rng) const;
 
  private:
@@ -52,8 +62,10 @@ class Rl2Networks {
 /// begins.
 class Rl2Policies : public PolicyFamily {
  public:
+  /// As Rl2Networks.
   Rl2Policies(const EnvSpec& env, const Rl2Settings& settings);
 
+  /// What the parameters are of.
   const Rl2Networks& networks() const { return networks_; }
 
   PolicyForm form() const override { return {"tanh", "none"}; }

@@ -13,8 +13,8 @@ namespace pmeta {
 struct TrialTargets {
   AlignedFloats log_densities;  ///< of its actions, by the policy that acted
   AlignedFloats values;         ///< by the critic of then
-  AlignedFloats advantages;
-  AlignedFloats returns;  ///< what the critic is to foretell
+  AlignedFloats advantages;     ///< normalised over the batch
+  AlignedFloats returns;        ///< what the critic is to foretell
 };
 
 /// The networks of RL² over whole trials: forward, and back through time.

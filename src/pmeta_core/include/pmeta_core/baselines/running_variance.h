@@ -9,11 +9,14 @@ namespace pmeta {
 /// Variance of all numbers so far (Welford, 1962).
 class RunningVariance {
  public:
+  /// Counts it in.
   void add(double value);
 
   double variance() const;  ///< population; 1 before the first number
 
+  /// Count, mean and sum of squares.
   void saveState(StateWriter& writer) const;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader);
 
  private:

@@ -9,7 +9,7 @@ namespace pmeta {
 
 /// What a policy did in the episodes of one task, one step a row, and how it turned out.
 struct ActionData {
-  std::size_t rows = 0;
+  std::size_t rows = 0;              ///< steps of all its episodes
   std::vector<double> observations;  ///< [rows, inputs]
   std::vector<double> actions;       ///< u as it was drawn, [rows, actions]
   std::vector<double> advantages;    ///< [rows]
@@ -39,6 +39,7 @@ class PolicyOnData {
   /// Evaluates the policy of `parameters`, which must stay until the next call.
   void at(const double* parameters);
 
+  /// `clip`: of kClippedRatio alone.
   double loss(Surrogate kind, double clip = 0) const;
   /// Its gradient [size] into `gradient`.
   void gradient(Surrogate kind, double* gradient, double clip = 0) const;
@@ -47,6 +48,7 @@ class PolicyOnData {
 
   /// Mean of KL(pi_old || pi).
   double kl() const;
+  /// Its gradient [size] into `gradient`.
   void klGradient(double* gradient) const;
   /// The Gauss-Newton matrix of that KL times `direction` into `product`: its Hessian where pi is
   /// pi_old.

@@ -12,13 +12,15 @@ namespace pmeta {
 
 /// Some episodes of one task, one after the other, as a policy of RL² acted in them by samples.
 struct Trial {
+  /// Which training task it is of.
   int task = 0;
-  std::size_t steps = 0;
+  std::size_t steps = 0;  ///< of all its episodes
   // rows by step
-  AlignedFloats inputs;                      ///< of the recurrent network
-  AlignedFloats actions;                     ///< as they were drawn
-  AlignedFloats rewards;                     ///< that are learnt from
-  double first_return = 0, last_return = 0;  ///< of those episodes, as policies are judged
+  AlignedFloats inputs;     ///< of the recurrent network
+  AlignedFloats actions;    ///< as they were drawn
+  AlignedFloats rewards;    ///< that are learnt from
+  double first_return = 0;  ///< of the first episode, as policies are judged
+  double last_return = 0;   ///< of the last one
 };
 
 /// Plays trials, those of one task side by side and tasks on threads of their own. An episode that
@@ -40,7 +42,9 @@ class TrialSampler {
   void play(const float* parameters, std::uint64_t seed, std::uint64_t iteration,
             std::vector<Trial>& trials, IterationStats& stats);
 
+  /// Counts of broken episodes.
   void saveState(StateWriter& writer) const;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader);
 
  private:

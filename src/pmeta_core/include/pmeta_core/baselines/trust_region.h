@@ -6,6 +6,7 @@
 
 namespace pmeta {
 
+/// Of as many numbers as there are parameters.
 using Vector = std::vector<double>;
 
 /// Approximately the x with A x = b, A positive definite and given by its product, by conjugate
@@ -24,14 +25,14 @@ struct TrustRegionSettings {
 
 /// Loss and KL of a candidate.
 struct TriedStep {
-  double loss;
-  double kl;
+  double loss;  ///< to go down
+  double kl;    ///< to stay within TrustRegionSettings::max_kl
 };
 
 /// What became of a trust-region step.
 struct TrustRegionStep {
-  Vector parameters;  ///< accepted, or those before
-  bool accepted = false;
+  Vector parameters;             ///< accepted, or those before
+  bool accepted = false;         ///< else no candidate was good
   Vector direction;              ///< (F + damping)^-1 gradient
   double curvature = 0;          ///< direction . (F + damping) direction
   std::vector<TriedStep> tried;  ///< in order; the last is the accepted one

@@ -33,9 +33,10 @@ class GruWorkspace {
   std::size_t max_rows_, max_batch_;
   std::vector<std::size_t> batches_;  // of the last unroll
   // by step and sequence
-  AlignedFloats gates_;     // n, r, z and what h gave to n; after backward() gradients by those
-  AlignedFloats previous_;  // hidden state before the step
-  AlignedFloats hidden_;    // and after it
+  AlignedFloats gates_;       // n, r, z and what h gave to n; after backward() gradients by those
+  AlignedFloats previous_;    // hidden state before the step
+  AlignedFloats hidden_;      // and after it
+  AlignedFloats transposed_;  // weight_hh
   // of one step
   AlignedFloats recurrent_;
   AlignedFloats carried_, next_carried_;  // gradients by the hidden state
@@ -60,8 +61,11 @@ class Gru {
   /// Throws Error unless every size is positive and the prefix a name.
   explicit Gru(GruSpec spec);
 
+  /// As it was made.
   const GruSpec& spec() const { return spec_; }
+  /// Numbers of an input.
   std::size_t inputs() const { return spec_.inputs; }
+  /// Numbers of a hidden state.
   std::size_t units() const { return spec_.units; }
   std::size_t size() const { return size_; }  ///< number of parameters
 
@@ -88,13 +92,13 @@ class Gru {
                 float* d_input, float* d_initial, GruWorkspace& workspace) const;
 
  private:
-  void begin(const std::vector<std::size_t>& batches, GruWorkspace& workspace) const;
   void forward(const float* parameters, const float* input, const float* initial,
-               GruWorkspace& workspace) const;
+               Transpose recurrent, GruWorkspace& workspace) const;
   void backwardThroughTime(const float* parameters, const float* d_hidden,
                            GruWorkspace& workspace) const;
-  void linear(const float* x, std::size_t rows, std::size_t inputs, const float* weight,
-              const float* bias, std::size_t outputs, float* y, std::size_t stride) const;
+  void linear(const float* x, std::size_t rows, std::size_t inputs, Transpose transpose,
+              const float* weight, const float* bias, std::size_t outputs, float* y,
+              std::size_t stride) const;
 
   GruSpec spec_;
   decltype(&gemm) product_;

@@ -22,7 +22,7 @@ struct MlpSpec {
   std::size_t outputs = 0;          ///< positive
   bool dueling = false;             ///< two heads, Q = V + A - mean A (Wang et al., 2016, eq. 9)
   bool portable = false;            ///< products by gemmEigen: the same bits on every processor
-  Activation activation = Activation::kRelu;
+  Activation activation = Activation::kRelu;  ///< of hidden layers
 };
 
 class Mlp;

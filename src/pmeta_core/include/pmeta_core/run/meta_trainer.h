@@ -19,6 +19,9 @@ namespace pmeta {
 ///
 /// A round is Experiment::stepsPerRound() transitions, worked off in whole iterations: what is made
 /// beyond counts for the next round, which may then have none of its own.
+///
+/// One that begins in the middle of a run, without a state to load, goes on from the meta-policy:
+/// it has lost its data and moments, and the costs of the rounds before, but not what was learnt.
 class MetaTrainer : public Party {
  public:
   /// Throws Error unless the experiment has a meta-learner.
@@ -36,6 +39,7 @@ class MetaTrainer : public Party {
   std::int64_t brokenEpisodes() const override { return broken_episodes_; }
   int round() const override { return round_; }
   void saveState(StateWriter& writer) const override;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader) override;
 
  private:
@@ -77,6 +81,7 @@ class MetaTrainer : public Party {
   std::vector<std::unique_ptr<Evaluation>> evaluation_;  // of each task
   int round_ = 0;                                        // trained last
   std::uint64_t iterations_ = 0;
+  std::int64_t surplus_ = 0;      // steps beyond those of the rounds so far
   bool between_ = true;           // no round has been left in its middle
   std::map<int, Totals> totals_;  // of the rounds that something is still to be told of
   RoundResult last_;              // of round_, without the model

@@ -15,7 +15,7 @@ namespace pmeta {
 
 /// What one round of training gives.
 struct RoundResult {
-  AuxiliaryUpdate update;
+  AuxiliaryUpdate update;              ///< to be sent
   std::optional<TaskReturn> personal;  ///< in rounds that evaluate; counts all since the last
                                        ///< scheduled one
   std::int64_t env_steps = 0;          ///< of this round
@@ -27,6 +27,7 @@ struct RoundResult {
 
   /// All but the update, which follows from the party's state.
   void saveState(StateWriter& writer) const;
+  /// Refuses what no round gives; `update` and `losses` stay empty.
   void loadState(StateReader& reader);
 };
 
@@ -46,6 +47,7 @@ class Party {
   virtual std::vector<int> tasks() const = 0;
 
   virtual bool trains() const = 0;  ///< or does it only evaluate?
+  /// Of all parameters that it takes and sends.
   virtual const ModelLayout& layout() const = 0;
 
   /// What KeepGoing counts up to in a round: updates of an agent, steps of a meta-learner.
@@ -87,6 +89,7 @@ class Party {
   /// All that its later rounds depend on. To be called between two rounds, where no generator is
   /// alive; throws Error after a round that was stopped, or where there is no state.
   virtual void saveState(StateWriter& writer) const = 0;
+  /// Refuses the state of another party, or of a round beyond the run's last.
   virtual void loadState(StateReader& reader) = 0;
 };
 

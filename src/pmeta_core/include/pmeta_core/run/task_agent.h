@@ -46,6 +46,7 @@ class TaskAgent : public Party {
   std::int64_t brokenEpisodes() const override { return broken_episodes_; }
   int round() const override { return round_; }
   void saveState(StateWriter& writer) const override;
+  /// Refuses what no saveState() of one with these settings gives.
   void loadState(StateReader& reader) override;
   std::optional<Episode> recordPersonal() const override;
   void savePersonal(const Experiment& experiment, int round) const override;
