@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "allocations.h"
 #include "baselines/opposite_goals.h"
 #include "memory_state.h"
 #include "support.h"
@@ -123,6 +124,16 @@ TEST(Pearl, ContextCountsTheSparseReward) {
   const ReplayBuffer& context = learner.task(0).context().kept();
   for (std::size_t k = 0; k < replay.size(); ++k) EXPECT_LT(replay[k].reward, 0);
   for (std::size_t k = 0; k < context.size(); ++k) EXPECT_GE(context[k].reward, 0);
+}
+
+TEST(Pearl, UpdatesAllocateNothing) {
+  Pearl learner(test::oppositeGoals(), smallSettings());
+  learner.setModel(test::initialModel(learner, 1));
+  learner.iterate(1, 0);
+  Rng rng(1, 0, Stream::kSample, 1);
+  const std::size_t before = test::allocations();
+  for (int k = 0; k < 5; ++k) learner.update(rng);
+  EXPECT_EQ(test::allocations() - before, 0u);
 }
 
 TEST(Pearl, ThreadsChangeNothing) {
