@@ -123,8 +123,10 @@ print(sorted(collections.Counter((m.policy_name, m.round) for _, m, _ in
             assert found and int(found.group(1)) >= 5, (policy, number, counted)
 
     with process(["roslaunch", "pmeta_nodes", "replay_bag.launch", "bag:=%s" % bag, "delay:=0.5",
-                  "rviz:=false"], tmp_path / "replay.log", env):
+                  "rviz:=false"], tmp_path / "replay.log", env) as replayed:
         title = "gridworld: round 3 of 3 (finished)"
         assert wait_until(lambda: title in run(
             ["timeout", "20", "rostopic", "echo", "-n1", "/pmeta/markers"], env=env).stdout), \
             (tmp_path / "replay.log").read_text()
+        replayed.terminate()  # killed, it would leave its nodes behind
+        replayed.wait(60)

@@ -45,11 +45,13 @@ def test_toys_learn_over_ros_as_in_one_process_and_are_drawn(config, tmp_path):
     env = environment(tmp_path)
     launch = ["roslaunch", "pmeta_nodes", "experiment.launch", "config:=%s" % config,
               "run_id:=ros", "results_dir:=%s" % tmp_path, "hold:=true", "view:=true"]
-    with process(launch, tmp_path / "launch.log", env):
+    with process(launch, tmp_path / "launch.log", env) as launched:
         manifest = tmp_path / "toys/ros/manifest.json"
         assert wait_until(lambda: manifest.exists() and '"finished"' in manifest.read_text(), 60), \
             (tmp_path / "launch.log").read_text()
         markers = run(["rostopic", "echo", "-n", "1", "/pmeta/markers"], env=env, timeout=60)
+        launched.terminate()  # killed, it would leave its nodes behind
+        launched.wait(60)
     assert markers.stdout.count("toy_discs") == 3
     assert rows_of(tmp_path, "ros") == expected
 
