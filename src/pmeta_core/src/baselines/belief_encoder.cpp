@@ -65,6 +65,16 @@ void BeliefEncoder::step(const float* parameters, const float* token, float* hid
   toBeliefs(head_.forward(parameters + gru_.size(), hidden, 1, workspace.head), 1, belief);
 }
 
+void addBeliefGradient(const float* belief, std::size_t latent_size, const float* noise,
+                       const float* d_z, float kl_weight, float* d_belief) {
+  for (std::size_t i = 0; i < latent_size; ++i) {
+    const float mean = belief[i], variance = belief[latent_size + i];
+    d_belief[i] += d_z[i] + kl_weight * mean;
+    d_belief[latent_size + i] +=
+        0.5f * (d_z[i] * noise[i] / std::sqrt(variance) + kl_weight * (1 - 1 / variance));
+  }
+}
+
 TrialBeliefs::TrialBeliefs(const BeliefEncoder& encoder, std::size_t max_trials,
                            std::size_t max_steps)
     : encoder_(encoder),

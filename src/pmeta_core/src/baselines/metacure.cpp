@@ -173,16 +173,12 @@ double MetaCure::updateEncoder() {
       static_cast<float>(settings_.kl_weight / static_cast<double>(rows_.size()));
   double kl = 0;
   for (std::size_t row = 0; row < rows_.size(); ++row) {
-    const float* mean = beliefs_.at(rows_[row].trial, rows_[row].t);
-    const float* variance = mean + latent;
-    const float* d_z = &exploiter_.taskInputGradient()[row * latent];
-    float* d_belief = beliefs_.gradientAt(rows_[row].trial, rows_[row].t);
-    for (std::size_t i = 0; i < latent; ++i) {
-      d_belief[i] += d_z[i] + kl_weight * mean[i];
-      d_belief[latent + i] += 0.5f * (d_z[i] * noise_[row * latent + i] / std::sqrt(variance[i]) +
-                                      kl_weight * (1 - 1 / variance[i]));
-    }
-    kl += beliefKl(mean, latent) / static_cast<double>(rows_.size());
+    const auto [k, t, step] = rows_[row];
+    const float* belief = beliefs_.at(k, t);
+    addBeliefGradient(belief, latent, &noise_[row * latent],
+                      &exploiter_.taskInputGradient()[row * latent], kl_weight,
+                      beliefs_.gradientAt(k, t));
+    kl += beliefKl(belief, latent) / static_cast<double>(rows_.size());
   }
   const std::size_t offset = networks().encoderOffset();
   beliefs_.backward(model_.floats().data() + offset, encoder_gradient_.data());
@@ -231,7 +227,7 @@ std::int64_t MetaCure::brokenEpisodes() const {
   return count;
 }
 
-std::unique_ptr<Adaptation> MetaCure::adapt(const Model& policy) const {
+std::unique_ptr<Adaptation> MetaCure::adapt(const Model& policy, int) const {
   return std::make_unique<MetaCureAdaptation>(networks(), policy.floats().data());
 }
 

@@ -14,11 +14,11 @@ class MetaCureKind : public MetaLearnerKind {
   std::unique_ptr<MetaLearner> make(const MetaTasks& tasks) const override {
     return std::make_unique<MetaCure>(tasks, settings_);
   }
-  std::unique_ptr<PolicyFamily> policies(const Env& env) const override {
+  std::unique_ptr<PolicyFamily> policies(const Env& env, int) const override {
     return std::make_unique<MetaCurePolicies>(env.spec(), settings_);
   }
   // the prior's mean
-  std::vector<float> unknownTask() const override {
+  std::optional<std::vector<float>> metaInput(int, int) const override {
     return std::vector<float>(static_cast<std::size_t>(settings_.latent_size));
   }
 

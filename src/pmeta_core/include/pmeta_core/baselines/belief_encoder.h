@@ -65,6 +65,11 @@ double beliefKl(const Scalar* belief, std::size_t latent_size) {
   return kl;
 }
 
+/// Adds to `d_belief` the gradient of L(z) + kl_weight * KL(belief || N(0, I)), where
+/// z = mean + sqrt(variance) * noise and `d_z` is the gradient of L.
+void addBeliefGradient(const float* belief, std::size_t latent_size, const float* noise,
+                       const float* d_z, float kl_weight, float* d_belief);
+
 /// Beliefs along whole trials, forward and back through time: b_0 to b_T of one of T steps.
 class TrialBeliefs {
  public:

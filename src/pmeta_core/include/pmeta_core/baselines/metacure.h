@@ -47,7 +47,7 @@ class MetaCure : public MetaLearner {
   IterationStats iterate(std::uint64_t seed, std::uint64_t iteration) override;
   /// Means over the iteration's updates.
   const std::vector<Loss>& losses() const override { return losses_; }
-  std::unique_ptr<Adaptation> adapt(const Model& policy) const override;
+  std::unique_ptr<Adaptation> adapt(const Model& policy, int task) const override;
   void saveState(StateWriter& writer) const override;
   void loadState(StateReader& reader) override;
 
