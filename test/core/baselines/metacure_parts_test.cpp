@@ -83,7 +83,7 @@ class CriticLoss {
   explicit CriticLoss(const MetaCureSettings& settings)
       : networks_(pointSpec(), settings),
         latent_(networks_.encoder().latentSize()),
-        theta_(networks_.encoderOffset() + networks_.encoder().size()),
+        theta_(networks_.size()),
         store_(3, 5, 2, 2),
         beliefs_(networks_.encoder(), 3, 5),
         update_(networks_.exploiter(), exploiterSettings(settings), {}) {
@@ -186,7 +186,7 @@ class Recorded : public Actor {
 
 TEST(MetaCureExplorer, BelievesWhatItIsTrainedOn) {
   const MetaCureNetworks networks(pointSpec(), smallSettings());
-  std::vector<float> theta(networks.encoderOffset() + networks.encoder().size());
+  std::vector<float> theta(networks.size());
   Rng rng(2, 0, Stream::kInitialise);
   networks.initialise(theta.data(), rng);
   MetaCureExplorer explorer(networks, theta.data(), GaussianActor::By::kSample);

@@ -21,23 +21,28 @@ class BeliefEncoder {
  public:
   /// Room for one step of one trial.
   struct Workspace {
+    /// For this encoder.
     explicit Workspace(const BeliefEncoder& encoder)
         : recurrent(encoder.gru_, 1, 1), head(encoder.head_, 1) {}
-    GruWorkspace recurrent;
-    MlpWorkspace head;
+    GruWorkspace recurrent;  ///< of the recurrent unit
+    MlpWorkspace head;       ///< of the linear layer
   };
 
+  /// Throws Error unless sizes are positive.
   BeliefEncoder(const EnvSpec& env, const MetaCureSettings& settings);
 
+  /// Numbers of an observation.
   std::size_t observationSize() const { return observation_size_; }
+  /// Numbers of an action.
   std::size_t actionSize() const { return gru_.inputs() - observation_size_ - 1; }
-  std::size_t tokenSize() const { return gru_.inputs(); }
-  std::size_t latentSize() const { return head_.outputs() / 2; }
-  std::size_t beliefSize() const { return head_.outputs(); }
-  std::size_t units() const { return gru_.units(); }
+  std::size_t tokenSize() const { return gru_.inputs(); }         ///< of a token
+  std::size_t latentSize() const { return head_.outputs() / 2; }  ///< of z
+  std::size_t beliefSize() const { return head_.outputs(); }      ///< mean and variance
+  std::size_t units() const { return gru_.units(); }              ///< of the hidden state
 
-  std::size_t size() const { return gru_.size() + head_.size(); }
-  std::vector<Block> blocks() const;
+  std::size_t size() const { return gru_.size() + head_.size(); }  ///< parameters
+  std::vector<Block> blocks() const;                               ///< of them, in order
+  /// Orthogonal weights, biases 0.
   void initialise(float* parameters, Rng& rng) const;
 
   /// Takes in one token: `hidden` moves on, and gives `belief`.
@@ -76,6 +81,7 @@ class TrialBeliefs {
   /// Of up to `max_trials` trials of up to `max_steps` steps each. The encoder must outlive it.
   TrialBeliefs(const BeliefEncoder& encoder, std::size_t max_trials, std::size_t max_steps);
 
+  /// Of `trials`, at least one, which must stay where they are until backward().
   void infer(const float* parameters, const std::vector<StoredTrial>& trials);
 
   /// b_t of the k-th trial.

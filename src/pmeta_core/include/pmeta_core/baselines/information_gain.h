@@ -32,16 +32,19 @@ double predictionError(const Scalar* predicted, const Scalar* seen, std::size_t 
 /// serve training alone and are no part of a policy.
 class InformationGain {
  public:
+  /// What an update gave.
   struct Losses {
-    double by_belief = 0, by_task = 0;  ///< means of predictionError()
+    double by_belief = 0;  ///< mean of predictionError()
+    double by_task = 0;    ///< the same
   };
 
+  /// For batches of meta_batch * task_batch steps.
   InformationGain(const EnvSpec& env, int num_tasks, const MetaCureSettings& settings);
 
   /// To be called before the first update.
   void initialise(Rng& rng);
 
-  /// Takes a step on `task` as the row-th of meta_batch * task_batch; `belief` before it.
+  /// Takes a step on `task` as the row-th of the batch; `belief` before it.
   void put(std::size_t row, const Transition& step, const float* belief, std::size_t task);
 
   /// A step of Adam on both.
@@ -50,7 +53,9 @@ class InformationGain {
   /// Of each row.
   const std::vector<float>& gains();
 
+  /// Parameters and moments.
   void saveState(StateWriter& writer) const;
+  /// The same.
   void loadState(StateReader& reader);
 
  private:

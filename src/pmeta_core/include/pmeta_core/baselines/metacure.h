@@ -51,6 +51,7 @@ class MetaCure : public MetaLearner {
   void saveState(StateWriter& writer) const override;
   void loadState(StateReader& reader) override;
 
+  /// The i-th of those that are trained on.
   const MetaCureCollector& task(std::size_t i) const { return *tasks_[i]; }
 
  private:

@@ -32,11 +32,16 @@ class MetaCureCollector : private Actor {
   /// transitions made.
   std::int64_t visit(Rng& rng);
 
+  /// Of all steps.
   const ReplayBuffer& replay() const { return replay_; }
+  /// Of the explorer.
   const TrialStore& trials() const { return trials_; }
+  /// So far.
   std::int64_t brokenEpisodes() const { return rollout_.broken().count(); }
 
+  /// Replay, trials, and how many episodes broke down.
   void saveState(StateWriter& writer) const;
+  /// The same.
   void loadState(StateReader& reader);
 
  private:

@@ -41,6 +41,7 @@ class MetaCureExplorer : public Actor {
 /// the mean of what it believes in the end. Before exploration that is the prior's, 0.
 class MetaCureAdaptation : public Adaptation {
  public:
+  /// `parameters` stay as they are; they and the networks must outlive this.
   MetaCureAdaptation(const MetaCureNetworks& networks, const float* parameters);
 
   void beginEpisode(Rng&) override {}

@@ -20,12 +20,18 @@ class MetaCureNetworks {
   MetaCureNetworks(const EnvSpec& env, const MetaCureSettings& settings);
 
   const SacNetworks& exploiter() const { return exploiter_; }  ///< its parameters begin at 0
+  /// On beliefs.
   const SacNetworks& explorer() const { return explorer_; }
+  /// Of trials.
   const BeliefEncoder& encoder() const { return encoder_; }
 
+  /// Where the explorer's parameters begin.
   std::size_t explorerOffset() const { return exploiter_.size(); }
+  /// Where the encoder's begin.
   std::size_t encoderOffset() const { return explorerOffset() + explorer_.size(); }
-  std::vector<Block> blocks() const;
+  std::size_t size() const { return encoderOffset() + encoder_.size(); }  ///< of all parameters
+  std::vector<Block> blocks() const;                                      ///< of all, in order
+  /// Each network as its class does it.
   void initialise(float* parameters, Rng& rng) const;
 
  private:
@@ -36,8 +42,10 @@ class MetaCureNetworks {
 /// Policies of those networks: the exploiter, told a z.
 class MetaCurePolicies : public PolicyFamily {
  public:
+  /// As MetaCureNetworks.
   MetaCurePolicies(const EnvSpec& env, const MetaCureSettings& settings);
 
+  /// What the parameters are of.
   const MetaCureNetworks& networks() const { return networks_; }
 
   PolicyForm form() const override { return {"relu", "tanh"}; }

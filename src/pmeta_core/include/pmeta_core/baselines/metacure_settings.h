@@ -11,6 +11,7 @@ namespace pmeta {
 /// Settings of MetaCURE; the defaults are small ones, for one core. Of `sac` those apply that are
 /// bound below; exploiterSettings() and explorerSettings() set the others.
 struct MetaCureSettings {
+  /// The defaults.
   MetaCureSettings();
 
   SacSettings sac;                   ///< of exploiter and explorer alike
@@ -40,8 +41,9 @@ void bind(Settings& settings, const std::string& prefix, MetaCureSettings& cure)
 /// Throws Error on settings that do not go together, or not with so many training tasks.
 void check(const MetaCureSettings& cure, int num_tasks);
 
-/// What one update of meta_batch tasks is, as SacUpdate takes it.
+/// What one update of the exploiter is, as SacUpdate takes it: of meta_batch tasks.
 SacSettings exploiterSettings(const MetaCureSettings& cure);
+/// The same of the explorer, whose networks have names of their own.
 SacSettings explorerSettings(const MetaCureSettings& cure);
 
 }  // namespace pmeta

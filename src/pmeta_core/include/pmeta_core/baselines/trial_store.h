@@ -10,22 +10,25 @@ namespace pmeta {
 
 /// A view of one step of a stored trial.
 struct TrialStep {
-  const float* observation;
-  const float* action;
-  float reward;            ///< that is trained on
-  float evaluated_reward;  ///< that policies are judged by, and tasks told apart
-  const float* next_observation;
+  const float* observation;       ///< s_t
+  const float* action;            ///< a_t
+  float reward;                   ///< that is trained on
+  float evaluated_reward;         ///< that policies are judged by, and tasks told apart
+  const float* next_observation;  ///< s_{t+1}, before any reset
 };
 
 /// A view of a stored trial: episodes of one task, one after the other. Valid until the next one
 /// is added.
 class StoredTrial {
  public:
+  /// For TrialStore.
   StoredTrial(const float* rows, std::size_t steps, std::size_t observation_size,
               std::size_t action_size)
       : rows_(rows), steps_(steps), observations_(observation_size), actions_(action_size) {}
 
+  /// Steps of all its episodes; at least 1.
   std::size_t steps() const { return steps_; }
+  /// Step t, t below steps().
   TrialStep operator[](std::size_t t) const;
 
   /// Where the trial is after t steps, t up to steps(): the observation that step t acts on, which
@@ -50,11 +53,13 @@ class TrialStore {
   /// Keeps the trial at hand, unless it has no step; the next step begins another.
   void endTrial();
 
-  std::size_t size() const { return steps_.size(); }
+  std::size_t size() const { return steps_.size(); }  ///< trials kept
+  /// The one in slot k, k below size().
   StoredTrial operator[](std::size_t k) const;
 
   /// To be called between trials.
   void saveState(StateWriter& writer) const;
+  /// Refuses trials that are longer than max_steps.
   void loadState(StateReader& reader);
 
  private:
