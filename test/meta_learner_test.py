@@ -18,6 +18,9 @@ METHODS = {
     "pearl": ["steps_per_round:=700", "pearl.hidden:=[8]", "pearl.context_hidden:=[8]",
               "pearl.warm_up_steps:=100", "pearl.prior_steps:=40", "pearl.posterior_steps:=40",
               "pearl.updates_per_iteration:=10"],
+    "metacure": ["steps_per_round:=700", "metacure.hidden:=[8]", "metacure.recurrent_units:=8",
+                 "metacure.warm_up_steps:=100", "metacure.prior_steps:=40",
+                 "metacure.posterior_steps:=40", "metacure.updates_per_iteration:=10"],
 }
 
 

@@ -162,8 +162,8 @@ TEST(Experiment, ValuesOutOfRangeAreRefused) {
             "rounds is '0' (given as rounds:=0) but must be a whole number, from 1 to 1e+06.");
   EXPECT_EQ(refused({"algorithm:=maml"}),
             "algorithm is 'maml' (given as algorithm:=maml) but must be one of "
-            "fedprox, independent, model_averaging, pmeta, pooled, maml_trpo, pearl, pooled_sac, "
-            "promp, rl2.");
+            "fedprox, independent, model_averaging, pmeta, pooled, maml_trpo, metacure, pearl, "
+            "pooled_sac, promp, rl2.");
   EXPECT_NE(refused({"algorithm:=pmtea"}).find(": did you mean 'pmeta'?"), std::string::npos);
   EXPECT_EQ(refused({"quorum:=6"}),
             "aggregation.quorum is 6 but there are 5 tasks: give at most that, or 0 for all.");

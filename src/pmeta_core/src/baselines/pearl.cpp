@@ -1,13 +1,11 @@
 #include "pmeta_core/baselines/pearl.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <string>
 
 #include "pmeta_core/adapt/latent_adaptation.h"
-#include "pmeta_core/base/error.h"
 #include "pmeta_core/baselines/for_each_task.h"
+#include "pmeta_core/baselines/replay_size.h"
 
 namespace pmeta {
 namespace {
@@ -16,27 +14,6 @@ ProximalAdamSettings adam(double learning_rate) {
   ProximalAdamSettings settings;
   settings.learning_rate = learning_rate;
   return settings;
-}
-
-// Of each task: all of the run, since together they hold no more than that, up to the million of
-// the release. Pages that no transition has reached cost nothing.
-std::size_t replaySize(const MetaTasks& tasks, int wanted, const SacNetworks& networks) {
-  constexpr std::int64_t kMost = 1000000;
-  const std::int64_t total = tasks.total_steps > 0 ? tasks.total_steps : kMost;
-  const std::int64_t each = wanted > 0 ? wanted : std::min(total, kMost);
-  const double bytes_each =
-      4.0 * static_cast<double>(2 * networks.observationSize() + networks.actionSize() + 2);
-  const auto filled = static_cast<double>(std::min(each * tasks.count(), total));
-  const double memory =
-      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-  if (filled * bytes_each > memory) {
-    const auto fits = static_cast<std::int64_t>(memory / 2 / bytes_each / tasks.count());
-    throw Error("the replays of " + std::to_string(tasks.count()) + " tasks would come to " +
-                std::to_string(static_cast<std::int64_t>(filled)) +
-                " transitions, which do not fit into this machine's memory: set " +
-                "pearl.buffer_size to at most " + std::to_string(fits) + " a task.");
-  }
-  return static_cast<std::size_t>(each);
 }
 
 }  // namespace
@@ -51,7 +28,7 @@ Pearl::Pearl(const MetaTasks& tasks, const PearlSettings& settings)
       update_(networks(), update_settings_, {}),
       losses_{{"critic", 0}, {"actor", 0}, {"entropy", 0}, {"temperature", 0}, {"kl", 0}} {
   if (networks().hasValue()) losses_.push_back({"value", 0});
-  const std::size_t buffer_size = replaySize(tasks, settings.buffer_size, networks());
+  const std::size_t buffer_size = replaySize(tasks, settings.buffer_size, "pearl.");
   for (int i = 0; i < tasks.count(); ++i) {
     tasks_.push_back(std::make_unique<PearlCollector>(tasks.family->make(i), networks(),
                                                       update_settings_, buffer_size));
