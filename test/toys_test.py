@@ -92,6 +92,7 @@ ELSEWHERE = {
     ("pmeta", "pmeta_html.py"),  # the project
     ("mean", "console.cpp"), ("mean", "pmeta_figures.py"), ("mean", "pmeta_sections.py"),
     ("mean", "pmeta_tables.py"),  # a column
+    ("mean", "rl2_networks.cpp"), ("mean", "running_variance.cpp"),  # a block, a number
     # defaults
     ("gridworld", "experiment_settings.h"), ("q_learning", "experiment_settings.h"),
     ("pmeta", "experiment_settings.h"), ("mean", "experiment_settings.h"),

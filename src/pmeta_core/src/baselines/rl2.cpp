@@ -54,7 +54,7 @@ Rl2::Rl2(const MetaTasks& tasks, const Rl2Settings& settings)
       gradient_(model_.size()) {}
 
 void Rl2::setModel(const Model& model) {
-  checkModel(model, policies_.layout(), "rl2");
+  checkModel(model, policies_.layout(), "the aggregator");
   // in place: Adam holds on to the memory
   std::copy(model.floats().begin(), model.floats().end(), model_.floats().begin());
 }

@@ -85,6 +85,11 @@ std::vector<YAML::Node> layersOf(YAML::Node base, const std::string& source,
   throw Error(unknownName("preset of " + source, preset, known));
 }
 
+void requireAlgorithms(const YAML::Node& of_algorithms) {
+  if (!of_algorithms || !of_algorithms.IsMap()) return;
+  for (const auto& algorithm : of_algorithms) algorithmNamed(algorithm.first.Scalar());
+}
+
 // a meta-learner has none of the agents' settings: what a file says of them is for the others
 void removeAgentSettings(YAML::Node layer) {
   if (!layer.IsMap()) return;
@@ -175,9 +180,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   const std::string library =
       peek({}, overrides, "", "library", anchored(peek(files, {}, "", "library", ""), folder));
   if (!library.empty()) loadLibrary(absolutePath("library", library));
-  if (of_algorithms && of_algorithms.IsMap()) {
-    for (const auto& algorithm : of_algorithms) algorithmNamed(algorithm.first.Scalar());
-  }
+  requireAlgorithms(of_algorithms);
   Experiment experiment;
   experiment.chooseKinds(peek(files, overrides, "", "algorithm", experiment.settings_.algorithm),
                          peek(files, overrides, "", "learner", experiment.settings_.learner));
@@ -209,14 +212,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   experiment.algorithm_ = &algorithmNamed(e.algorithm);
   experiment.applyAlgorithm();
   experiment.checkAggregation();
-  experiment.checkStability();
-  const bool portable = e.arithmetic == "portable";
-  if (experiment.hasMetaLearner()) {
-    experiment.meta_learner_->setPortable(portable);
-  } else {
-    experiment.learner_->setPortable(portable);
-    experiment.learner_->check();
-  }
+  experiment.checkLearning();
   e.results_dir = expandResultsDir(e.results_dir);
   if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
   if (!e.library.empty()) e.library = absolutePath("library", e.library);

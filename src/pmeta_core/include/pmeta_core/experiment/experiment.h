@@ -158,6 +158,7 @@ class Experiment {
   [[noreturn]] void refuseMemory() const;
   void applyAlgorithm();
   void checkAggregation() const;
+  void checkLearning();
   void checkStability();
 
   ExperimentSettings settings_;
