@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from programs import LOCAL, TOP, run
 from run_folders import (Kept, call, curve, edit, fails, groups_of, plot, summary, write_at_once,
                          write_run)
 import pmeta_archives as pa
@@ -313,6 +314,36 @@ def test_a_goal_that_is_not_told_is_missed(tmp_path, robots):
     assert "task 1 does not say where its goal is" in fails(tmp_path, "--what", "trajectories")
 
 
+@pytest.mark.skipif(not os.path.isfile(str(LOCAL)), reason="needs pmeta_local")
+@pytest.mark.parametrize("algorithm, keys", [
+    ("pmeta", [("test", 2), ("test", 3), ("train", 2), ("train", 3), "personal"]),
+    ("promp", [("test", 2), ("test", 3), ("train", 2), ("train", 3)])])
+def test_a_run_that_is_over_tells_its_ways(tmp_path, algorithm, keys):
+    small = (["sac.hidden:=[8]", "sac.context_hidden:=[8]", "updates_per_round:=2",
+              "warm_up_steps:=40"] if algorithm == "pmeta" else
+             ["promp.hidden:=[8]", "promp.episodes:=2", "steps_per_round:=200"])
+    done = run([LOCAL, "run", TOP / "config/sparse_point_robot.yaml", "algorithm:=" + algorithm,
+                "train_tasks:=2", "test_tasks:=1", "rounds:=1", "evaluation_interval:=1",
+                "exploration_episodes:=[2,3]", "run_id:=r", "results_dir:=%s" % tmp_path] + small)
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "sparse_point_robot/r"
+    assert run([LOCAL, "trace", folder]).returncode == 0
+    text = (folder / "trajectories.csv").read_bytes()
+    [found] = pr.load_runs([str(folder)])
+    assert sorted(found.trajectories, key=str) == keys
+    for key, ways in found.trajectories.items():
+        assert sorted(ways) == list(found.tasks_of(key))
+        for way in ways.values():
+            assert way.shape == (21, 2) and not way[0].any()
+            assert 0 < abs(way[1:] - way[:-1]).max() <= 0.1 + 1e-12
+    # what a policy does depends on nothing else
+    assert run([LOCAL, "trace", folder]).returncode == 0
+    assert (folder / "trajectories.csv").read_bytes() == text
+    for path in (folder / "policies").iterdir():
+        path.unlink()
+    assert "has no policies below policies/" in run([LOCAL, "trace", folder]).stderr
+
+
 PLAN = """sweeps:
   - {name: ours, use: test, priority: 1, core_hours: 1, page: page.md, experiment: grid,
      assignments: "seed:=0-1"}
@@ -323,6 +354,25 @@ figures:
 """
 PAGE = "".join("<!-- generated: %s -->\n<!-- end -->\n" % words for words in (
     "wins theirs ours", "margins theirs ours", "figure both comparison"))
+
+
+@pytest.mark.skipif(not os.path.isfile(str(LOCAL)), reason="needs pmeta_local")
+def test_a_page_shows_the_ways_of_its_sweep(tmp_path):
+    folder = tmp_path / "pages"
+    folder.mkdir()
+    (folder / "plan.yaml").write_text("""sweeps:
+  - {name: ways, use: test, priority: 1, core_hours: 0.1, page: page.md,
+     experiment: sparse_point_robot, assignments: "algorithm:=promp seed:=0 train_tasks:=2 rounds:=1
+       test_tasks:=1 evaluation_interval:=1 exploration_episodes:=2 hidden:=8 episodes:=2
+       steps_per_round:=100"}
+figures:
+  - {folder: ways, sweeps: [ways], kinds: [trajectories], keep: [trajectories]}
+""", encoding="utf-8")
+    (folder / "page.md").write_text("<!-- generated: figure ways trajectories -->\n<!-- end -->\n")
+    call(results.main, "--folder", folder, "--results-dir", tmp_path / "runs", "--run", "--jobs", "1")
+    call(results.main, "--folder", folder)
+    assert "(figures/ways/trajectories.png)" in (folder / "page.md").read_text(encoding="utf-8")
+    assert (folder / "figures/ways/trajectories.png").is_file()
 
 
 def test_a_page_says_who_wins_or_that_nothing_was_run(tmp_path):

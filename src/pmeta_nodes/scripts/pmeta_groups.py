@@ -48,7 +48,7 @@ class Group:
         self.figures = runs[0].figures
         # settings that others of the experiment have, and no run of this algorithm
         self.absent = frozenset()
-        self.place = self.figures.order
+        self.place = None  # among all algorithms, see _tell_places()
         self.label = self.name
         self.policies = [p for p in POLICIES if all(p in r.curves for r in runs)]
 

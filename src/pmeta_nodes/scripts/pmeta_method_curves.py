@@ -8,6 +8,7 @@ from pmeta_curves import (MP, PP, RETURN, SPREAD, draw_curve, draw_optimum, over
 from pmeta_drawing import baseline_style, headline, legend_right, panels
 
 STEPS = "environment steps of all training tasks"
+MARKS = 12  # of a curve, however many evaluations it has
 UNLIKE = 5  # times longer: a linear axis would press the shorter ones together
 OURS = {"PP": PP, "MP": MP}
 
@@ -22,12 +23,12 @@ def draw_comparison(experiments, figures):
     figure, axes, beside = grid(len(found))
     for axis, (experiment, methods) in zip(axes, found.items()):
         count = pm.common_count(methods)
+        steps_axis(axis, methods)
         for method in methods:
             for word, key in pm.judged_by(method, count):
                 draw_method(axis, method, key, word, count)
         draw_optimum(axis, [method.group for method in methods])
         axis.set_title(title_of(experiment, count), loc="left")
-        steps_axis(axis, methods)
     finish(figure, axes, beside, found, "training tasks")
     figures.save(figure, "comparison")
 
@@ -43,10 +44,10 @@ def draw_unseen_methods(experiments, figures):
     for column, (experiment, methods) in enumerate(found.items()):
         count = pm.common_count(methods, "test")
         for axis, number in zip(grid_of[:, column], (0, count)):
+            steps_axis(axis, methods)
             for method in methods:
                 draw_method(axis, method, pm.after(method.group, "test", number), "MP", number)
             axis.set_title(title_of(experiment, number), loc="left")
-            steps_axis(axis, methods)
         low, high = zip(*(axis.get_ylim() for axis in grid_of[:, column]))
         for axis in grid_of[:, column]:
             axis.set_ylim(min(low), max(high))
@@ -81,9 +82,10 @@ def draw_method(axis, method, key, word, count):
     label = pm.policy_name(word, method)
     if not isinstance(key, str) and method.explores and key[1] != count:
         label += ", after %d episodes" % key[1]
-    # by distance on the paper: a logarithmic axis presses the last ones together
-    style = dict(look_of(method, word), markevery=0.08)
-    draw_curve(axis, method.group, key, label, x=method.group.total_steps, **style)
+    style, steps = look_of(method, word), method.group.total_steps
+    places = (np.geomspace if axis.get_xscale() == "log" else np.linspace)(steps[0], steps[-1], MARKS)
+    marks = np.unique(np.searchsorted(steps, places).clip(0, len(steps) - 1))
+    draw_curve(axis, method.group, key, label, x=steps, markevery=marks.tolist(), **style)
     axis.axhline(method.group.final(key).mean(), color=style["color"], linestyle=":", linewidth=1.1,
                  zorder=1.5)
 

@@ -72,17 +72,29 @@ def is_packed(folder, sweep):
     return os.path.isfile(path) and pa.packed_command(path) == pp.command_of(sweep)
 
 
-def pack(options, sweep, results_dir):
+def pack(plan, options, sweep, results_dir):
     """Packs a sweep whose runs have all finished; True if they have."""
     runs = statuses(sweep, results_dir)
     finished = [folder for status, folder in runs if status == "finished"]
     if len(finished) < len(runs):
         print("%s: %d of %d runs have finished" % (sweep["name"], len(finished), len(runs)))
         return False
+    if any(sweep["name"] in figure["sweeps"] and "trajectories" in figure["kinds"]
+           for figure in plan.figures.values()):
+        for folder in finished:
+            trace(folder)
     path = pa.archive_of(options.folder, sweep["name"])
     pa.pack(path, sweep["name"], pp.command_of(sweep), finished)
     print("packed %d runs into %s (%d kB)" % (len(runs), path, os.path.getsize(path) // 1000 + 1))
     return True
+
+
+def trace(folder):
+    """Has the run's last policies act once more, for the figures that show their ways."""
+    done = subprocess.run([LOCAL, "trace", folder], stdout=subprocess.DEVNULL,
+                          stderr=subprocess.PIPE, universal_newlines=True)
+    if done.returncode != 0:
+        raise PlotError("%s: %s" % (folder, done.stderr.strip() or "pmeta_local failed."))
 
 
 def chosen(plan, options):
@@ -120,7 +132,7 @@ def run_missing(plan, options):
             return
         if code != 0:
             raise PlotError("sweep '%s' failed with exit code %d." % (sweep["name"], code))
-        pack(options, sweep, options.results_dir)
+        pack(plan, options, sweep, options.results_dir)
 
 
 def run_until(words, end):
@@ -197,7 +209,7 @@ def run(arguments):
         tell_status(plan, options)
     elif options.source:
         for sweep in chosen(plan, options):
-            pack(options, sweep, options.source)
+            pack(plan, options, sweep, options.source)
     elif options.run:
         run_missing(plan, options)
     else:

@@ -223,6 +223,10 @@ algorithms:
   // a preset is read over what the file says of the algorithm, the algorithm's own preset last
   const Experiment quick = points({"preset:=quick"}, more);
   EXPECT_EQ(quick.settings().rounds, 2);
+  // and takes nothing of them away
+  EXPECT_EQ(quick.settings().seed, 5);
+  EXPECT_EQ(quick.settings().experiment, plain.settings().experiment);
+  EXPECT_EQ(value(quick, "environment.name"), value(plain, "environment.name"));
   EXPECT_EQ(value(quick, "promp.clip"), "0.5");
   EXPECT_EQ(value(quick, "promp.learning_rate"), "0.25");
   EXPECT_EQ(points({"preset:=only_here"}, more).settings().rounds, 3);

@@ -68,16 +68,18 @@ std::vector<YAML::Node> layersOf(YAML::Node base, const std::string& source,
   std::vector<YAML::Node> of_preset;
   std::vector<std::string> known;
   choose(presets, preset, of_preset, known);
-  std::vector<YAML::Node> layers = of_preset;
-  layers.insert(layers.begin(), base);
+  // only appended to: to assign to a node is to change what it stands for, here the file itself
+  std::vector<YAML::Node> layers = {base};
+  std::vector<YAML::Node> general = layers;
+  general.insert(general.end(), of_preset.begin(), of_preset.end());
   const std::string algorithm =
-      peek(layers, overrides, "", "algorithm", ExperimentSettings().algorithm);
+      peek(general, overrides, "", "algorithm", ExperimentSettings().algorithm);
   if (algorithms && algorithms.IsMap() && algorithms[algorithm]) {
     YAML::Node own = algorithms[algorithm];
     choose(taken(own, "presets"), preset, of_preset, known);
-    layers = of_preset;
-    layers.insert(layers.begin(), {base, own});
+    layers.push_back(own);
   }
+  layers.insert(layers.end(), of_preset.begin(), of_preset.end());
   // effective settings name the preset they came from, which is part of them already
   const bool effective = !presets && peek({base}, {}, "", "preset", "") == preset;
   if (preset.empty() || !of_preset.empty() || effective) return layers;

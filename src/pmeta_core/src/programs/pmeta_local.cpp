@@ -22,6 +22,7 @@
 #include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/run/local_runner.h"
 #include "pmeta_core/run/sweep.h"
+#include "pmeta_core/run/trace.h"
 #include "pmeta_core/security/authentication.h"
 #include "pmeta_core/security/key_file.h"
 #include "pmeta_core/storage/manifest.h"
@@ -65,6 +66,9 @@ constexpr char kUsage[] =
                                        returns of a trained policy (policies/*.safetensors of a run
                                        folder) on fresh episodes, at least N (100), of its own task,
                                        or of every task if it is a meta-policy
+  trace RUN_DIR                        write trajectories.csv there: one greedy episode of each of
+                                       its last policies, of the meta-policy on every task and after
+                                       each number of exploration episodes
 
 Ctrl-C, SIGTERM or a closed terminal stops a run or a sweep when the round is over, a second one at
 once; other commands end at once. That nobody reads the output any more (| head) stops nothing.
@@ -356,6 +360,13 @@ int evaluate(const Arguments& arguments) {
   return 0;
 }
 
+int trace(const Arguments& arguments) {
+  if (arguments.words.size() != 1) throw Error("trace needs the folder of one run.");
+  pmeta::writeTrajectories(arguments.words[0]);
+  std::cout << "wrote " << arguments.words[0] << "/trajectories.csv" << std::endl;
+  return 0;
+}
+
 int dispatch(int argc, char** argv) {
   const std::string command = argc > 1 ? argv[1] : "";
   const bool wants_help = std::any_of(argv + 1, argv + argc, [](const char* word) {
@@ -373,6 +384,7 @@ int dispatch(int argc, char** argv) {
   if (command == "settings") return settings(parseArguments(argc, argv));
   if (command == "replay") return replay(parseArguments(argc, argv));
   if (command == "evaluate") return evaluate(parseArguments(argc, argv));
+  if (command == "trace") return trace(parseArguments(argc, argv));
   std::cerr << (command.empty() ? "" : "unknown command '" + command + "'\n") << kUsage;
   return 2;
 }

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <vector>
 
+#include "pmeta_core/act/evaluation.h"
 #include "pmeta_core/base/error.h"
 
 namespace pmeta {
@@ -114,6 +115,13 @@ std::string LoadedPolicy::description() const {
                                 ? "meta-policy of " + experiment_.settings().experiment
                                 : "personal policy of " + experiment_.family().taskName(task_);
   return whose + ", round " + std::to_string(round_) + " of run " + experiment_.settings().run_id;
+}
+
+Episode LoadedPolicy::record() {
+  const int task = std::max(task_, 0);
+  Evaluation evaluation(makeEnvs([&](int) { return experiment_.family().make(task); }, 1));
+  Rng rng(static_cast<std::uint64_t>(experiment_.settings().seed), task, Stream::kEvaluate);
+  return evaluation.record(*actor_, rng);
 }
 
 bool LoadedPolicy::act(const double* observation, double* action) {

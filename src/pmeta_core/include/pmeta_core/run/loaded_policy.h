@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "pmeta_core/act/episode.h"
 #include "pmeta_core/base/model.h"
 #include "pmeta_core/env/env.h"
 #include "pmeta_core/experiment/experiment.h"
@@ -39,6 +40,10 @@ class LoadedPolicy {
   /// and no action, if the observation is not finite or, for a table, of no state that the policy
   /// has values of. Allocates nothing.
   bool act(const double* observation, double* action);
+
+  /// One greedy episode on its task, or of a meta-policy on task 0, with the start of the first
+  /// evaluation episode of the run's rounds.
+  Episode record();
 
  private:
   LoadedPolicy(const std::string& path, PolicyFile file, int as_task);
