@@ -155,8 +155,7 @@ std::vector<TaskReturn> MetaTrainer::evaluateTask(int task, const MetaPolicy& me
                                                   std::unique_ptr<Adaptation>& adaptation) {
   const Stopwatch watch;
   adaptation = learner_->adapt(model, task);
-  std::vector<int> counts = experiment_.contextEpisodes();
-  counts.erase(counts.begin());
+  const std::vector<int> counts = explorationEpisodes();
   Rng rng = evaluationRng(task);
   std::vector<TaskReturn> results;
   for (const AdaptedReturn& adapted :
@@ -209,6 +208,21 @@ Episode MetaTrainer::recordMeta(const MetaPolicy& meta, int task) const {
   Rng rng = evaluationRng(task);
   const std::unique_ptr<Actor> actor = evaluated_->adaptations.at(k)->adapted(1);
   return evaluation_[k]->record(*actor, rng);
+}
+
+ReturnStats MetaTrainer::evaluateFresh(const Model& policy, int task, int episodes) const {
+  const auto k = static_cast<std::size_t>(task);
+  const std::vector<int> counts = explorationEpisodes();
+  return overFreshEpisodes(seed_, task, episodes, [&](Rng& rng) {
+    const std::unique_ptr<Adaptation> adaptation = learner_->adapt(policy, task);
+    return evaluateAdapted(*evaluation_[k], *adaptation, counts, rng).back().stats;
+  });
+}
+
+std::vector<int> MetaTrainer::explorationEpisodes() const {
+  std::vector<int> counts = experiment_.contextEpisodes();
+  counts.erase(counts.begin());  // none
+  return counts;
 }
 
 // the same draws for every round: differences are the policies', not the dice's

@@ -1,5 +1,7 @@
 #include "pmeta_core/run/party.h"
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "pmeta_core/base/error.h"
@@ -7,6 +9,24 @@
 namespace pmeta {
 
 void Party::savePersonal(const Experiment&, int) const {}
+
+ReturnStats overFreshEpisodes(std::uint64_t seed, int task, int episodes,
+                              const std::function<ReturnStats(Rng& rng)>& evaluate) {
+  ReturnStats total;
+  double mean_of_squares = 0;
+  for (std::uint64_t batch = 1; total.episodes < episodes; ++batch) {
+    // rounds evaluate with round 0 of this stream
+    Rng rng(seed, static_cast<std::uint64_t>(task), Stream::kEvaluate, batch);
+    const ReturnStats stats = evaluate(rng);
+    const double share = static_cast<double>(stats.episodes) / (total.episodes + stats.episodes);
+    total.mean += share * (stats.mean - total.mean);
+    mean_of_squares += share * (stats.mean * stats.mean + stats.std * stats.std - mean_of_squares);
+    total.episodes += stats.episodes;
+    total.broken_episodes += stats.broken_episodes;
+  }
+  total.std = std::sqrt(std::max(0.0, mean_of_squares - total.mean * total.mean));
+  return total;
+}
 
 void refuseUnevaluated(const MetaPolicy& meta) {
   throw Error("the meta-policy of round " + std::to_string(meta.round) +

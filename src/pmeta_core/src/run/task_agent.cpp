@@ -156,22 +156,10 @@ std::vector<TaskReturn> TaskAgent::evaluateMeta(const MetaPolicy& meta) {
 }
 
 ReturnStats TaskAgent::evaluateFresh(PolicyKind kind, const Model& policy, int episodes) const {
-  ReturnStats total;
-  double mean_of_squares = 0;
-  for (std::uint64_t batch = 1; total.episodes < episodes; ++batch) {
-    // rounds evaluate with round 0 of this stream
-    Rng rng(seed_, task_, Stream::kEvaluate, batch);
-    const ReturnStats stats = kind == PolicyKind::kPersonal
-                                  ? learner_->evaluate(policy, rng)
-                                  : learner_->evaluateAdapted(policy, rng).back().stats;
-    const double share = static_cast<double>(stats.episodes) / (total.episodes + stats.episodes);
-    total.mean += share * (stats.mean - total.mean);
-    mean_of_squares += share * (stats.mean * stats.mean + stats.std * stats.std - mean_of_squares);
-    total.episodes += stats.episodes;
-    total.broken_episodes += stats.broken_episodes;
-  }
-  total.std = std::sqrt(std::max(0.0, mean_of_squares - total.mean * total.mean));
-  return total;
+  return overFreshEpisodes(seed_, task_, episodes, [&](Rng& rng) {
+    return kind == PolicyKind::kPersonal ? learner_->evaluate(policy, rng)
+                                         : learner_->evaluateAdapted(policy, rng).back().stats;
+  });
 }
 
 void TaskAgent::saveState(StateWriter& writer) const {

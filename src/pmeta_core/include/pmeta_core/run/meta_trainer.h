@@ -36,6 +36,11 @@ class MetaTrainer : public Party {
                                         const KeepGoing& keep_going = {}) override;
   std::vector<TaskReturn> evaluateMeta(const MetaPolicy& meta) override;
   Episode recordMeta(const MetaPolicy& meta, int task) const override;
+
+  /// A meta-policy on a task after the most exploration that it is evaluated after, on at least
+  /// `episodes` episodes that no round evaluates.
+  ReturnStats evaluateFresh(const Model& policy, int task, int episodes) const;
+
   std::int64_t brokenEpisodes() const override { return broken_episodes_; }
   int round() const override { return round_; }
   void saveState(StateWriter& writer) const override;
@@ -66,6 +71,7 @@ class MetaTrainer : public Party {
   RoundResult lastResult() const;
   std::vector<TaskReturn> evaluateTask(int task, const MetaPolicy& meta, const Model& model,
                                        std::unique_ptr<Adaptation>& adaptation);
+  std::vector<int> explorationEpisodes() const;
   void addCosts(TaskReturn& result) const;
   int evaluatedBefore(int round) const;
   Rng evaluationRng(int task) const;

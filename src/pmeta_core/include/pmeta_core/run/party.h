@@ -93,6 +93,11 @@ class Party {
   virtual void loadState(StateReader& reader) = 0;
 };
 
+/// What `evaluate` gives with generators that no round evaluates with, once and again until there
+/// are `episodes` of it, taken together.
+ReturnStats overFreshEpisodes(std::uint64_t seed, int task, int episodes,
+                              const std::function<ReturnStats(Rng& rng)>& evaluate);
+
 /// Throws Error, which says that this meta-policy has not been evaluated.
 [[noreturn]] void refuseUnevaluated(const MetaPolicy& meta);
 
