@@ -55,9 +55,16 @@ void Experiment::checkAggregation() const {
   }
 }
 
+void Experiment::checkLearning() {
+  const bool portable = settings_.arithmetic == "portable";
+  if (hasMetaLearner()) return meta_learner_->setPortable(portable);
+  learner_->setPortable(portable);
+  checkStability();
+  learner_->check();
+}
+
 void Experiment::checkStability() {
   const PersonalSettings& p = settings_.personal;
-  if (hasMetaLearner()) return;
   const std::optional<double> gamma = learner_->linearDiscount();
   const bool tabular = gamma.has_value();
   // with frozen auxiliary parameters the update is a linear map that blows up beyond these; of a
