@@ -50,8 +50,8 @@ TEST(Join, PutsSeparatorsBetweenWords) {
 }
 
 TEST(UnknownName, ListsTheKnownAndTheNearest) {
-  EXPECT_EQ(unknownName("rule", "meidan", {"mean", "median"}),
-            "unknown rule 'meidan': did you mean 'median'? Known are mean, median.");
+  EXPECT_EQ(unknownName("rule", "medin", {"mean", "median"}),
+            "unknown rule 'medin': did you mean 'median'? Known are mean, median.");
   EXPECT_EQ(unknownName("rule", "vote", {"mean", "median"}),
             "unknown rule 'vote'. Known are mean, median.");
   EXPECT_EQ(unknownName("rule", "a\nb", {"mean"}), "unknown rule 'a?b'. Known are mean.");

@@ -202,8 +202,8 @@ TEST(Experiment, RobustAggregationIsSettings) {
   EXPECT_EQ(refused({"rule:=mode"}),
             "aggregation.rule is 'mode' (given as rule:=mode) but must be one of mean, median, "
             "trimmed_mean.");
-  EXPECT_EQ(refused({"rule:=meidan"}),
-            "aggregation.rule is 'meidan' (given as rule:=meidan) but must be one of mean, median, "
+  EXPECT_EQ(refused({"rule:=medin"}),
+            "aggregation.rule is 'medin' (given as rule:=medin) but must be one of mean, median, "
             "trimmed_mean: did you mean 'median'?");
 }
 

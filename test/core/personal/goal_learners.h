@@ -47,7 +47,7 @@ class Goal : public Env {
 
 constexpr int kTasks = 3;
 
-inline SacSettings smallSettings(const std::string& task_encoding = "one_hot") {
+inline SacSettings smallSac(const std::string& task_encoding = "one_hot") {
   SacSettings settings;
   settings.hidden = {8, 6};
   settings.batch_size = 16;
@@ -79,7 +79,7 @@ inline ProximalAdamSettings adamOf(const PersonalSettings& personal) {
   return settings;
 }
 
-inline PersonalLearner makeLearner(const SacSettings& settings = smallSettings(), int task = 1,
+inline PersonalLearner makeLearner(const SacSettings& settings = smallSac(), int task = 1,
                                    const PersonalSettings& personal = pulled()) {
   const auto make_env = [task](int) { return std::make_unique<Goal>(task - 1); };
   auto learner = std::make_unique<SacLearner>(

@@ -11,10 +11,10 @@ namespace {
 using test::makeLearner;
 using test::run;
 using test::sac;
-using test::smallSettings;
+using test::smallSac;
 
 TEST(SacPersonalLearner, EvaluatesWithTheMeanOfItsOwnContext) {
-  auto learner = makeLearner(smallSettings("inference"));
+  auto learner = makeLearner(smallSac("inference"));
   learner.beginRound(learner.initialModel(1), false);
   Rng rng(1, 0, Stream::kSample);
   run(learner, 20, rng);
@@ -38,7 +38,7 @@ TEST(SacPersonalLearner, EvaluatesWithTheMeanOfItsOwnContext) {
 }
 
 TEST(SacPersonalLearner, AdaptedReturnsCompareLikeWithLike) {
-  auto learner = makeLearner(smallSettings("inference"));
+  auto learner = makeLearner(smallSac("inference"));
   Model policy = learner.initialModel(1);
   Rng rng(3, 0, Stream::kEvaluate), same = rng;
   const std::vector<AdaptedReturn> returns = learner.evaluateAdapted(policy, rng);
@@ -59,7 +59,7 @@ TEST(SacPersonalLearner, AdaptedReturnsCompareLikeWithLike) {
 }
 
 TEST(SacPersonalLearner, MetaPoliciesAreJudgedAfterEachNumberOfEpisodesAskedFor) {
-  SacSettings settings = smallSettings("inference");
+  SacSettings settings = smallSac("inference");
   settings.context.exploration_episodes = {1, 3};
   const auto learner = makeLearner(settings);
   Rng rng(3, 0, Stream::kEvaluate), same = rng;

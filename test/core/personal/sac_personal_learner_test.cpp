@@ -25,7 +25,7 @@ using test::makeLearner;
 using test::pulled;
 using test::run;
 using test::sac;
-using test::smallSettings;
+using test::smallSac;
 
 TEST(SacPersonalLearner, LayoutNamesEveryNetwork) {
   EXPECT_EQ(makeLearner().layout().text(),
@@ -36,7 +36,7 @@ TEST(SacPersonalLearner, LayoutNamesEveryNetwork) {
             "critic1.layer1.bias 6\ncritic1.layer2.weight 1 6\ncritic1.layer2.bias 1\n"
             "critic2.layer0.weight 8 6\ncritic2.layer0.bias 8\ncritic2.layer1.weight 6 8\n"
             "critic2.layer1.bias 6\ncritic2.layer2.weight 1 6\ncritic2.layer2.bias 1\n");
-  const std::string text = makeLearner(smallSettings("inference")).layout().text();
+  const std::string text = makeLearner(smallSac("inference")).layout().text();
   EXPECT_NE(text.find("actor.layer0.weight 8 4\n"), std::string::npos);
   EXPECT_NE(text.find("encoder.layer0.weight 7 4\n"), std::string::npos);
   EXPECT_NE(text.find("encoder.layer2.weight 4 5\n"), std::string::npos);
@@ -67,7 +67,7 @@ struct Parts {
 TEST(SacPersonalLearner, UpdatesAreTheLearnersByAdamWithPull) {
   auto learner = makeLearner();
   const Model meta = learner.initialModel(1);
-  Parts parts(smallSettings(), meta, oneHot(1, kTasks));
+  Parts parts(smallSac(), meta, oneHot(1, kTasks));
   learner.beginRound(meta, false);
   Rng rng(5, 0, Stream::kSample), same = rng;
   for (int r = 0; r < 30; ++r) {
@@ -83,7 +83,7 @@ TEST(SacPersonalLearner, UpdatesAreTheLearnersByAdamWithPull) {
 
 TEST(SacPersonalLearner, TheMetaPolicyExploresForContext) {
   for (const std::string explorer : {"meta", "personal"}) {
-    SacSettings settings = smallSettings("inference");
+    SacSettings settings = smallSac("inference");
     settings.context.explorer = explorer;
     auto learner = makeLearner(settings);
     const Model meta = learner.initialModel(1);
@@ -100,7 +100,7 @@ TEST(SacPersonalLearner, TheMetaPolicyExploresForContext) {
 }
 
 TEST(SacPersonalLearner, RoundResetsParametersAndNothingElse) {
-  auto learner = makeLearner(smallSettings("inference"));
+  auto learner = makeLearner(smallSac("inference"));
   Rng rng(1, 0, Stream::kSample);
   learner.beginRound(learner.initialModel(1), false);
   const SacNetworks& networks = sac(learner).networks();
@@ -131,7 +131,7 @@ TEST(SacPersonalLearner, RoundResetsParametersAndNothingElse) {
 }
 
 TEST(SacPersonalLearner, TargetsAndMomentsBeginAnewWhereSettingsSaySo) {
-  SacSettings settings = smallSettings();
+  SacSettings settings = smallSac();
   settings.targets_at_round = "meta";
   settings.reset_moments = true;
   auto learner = makeLearner(settings);
@@ -152,7 +152,7 @@ TEST(SacPersonalLearner, OwnColumnIsAggregatedFromItsTaskAlone) {
   std::vector<Model> sent;
   Model meta;
   for (int task = 0; task < kTasks; ++task) {
-    auto learner = makeLearner(smallSettings(), task);
+    auto learner = makeLearner(smallSac(), task);
     meta = learner.initialModel(1);
     learner.beginRound(meta, false);
     Rng rng(1, static_cast<std::uint64_t>(task), Stream::kSample);
@@ -193,17 +193,17 @@ TEST(SacPersonalLearner, OwnColumnIsAggregatedFromItsTaskAlone) {
 }
 
 TEST(SacPersonalLearner, EverythingIsPresentWithoutOwnColumns) {
-  SacSettings settings = smallSettings();
+  SacSettings settings = smallSac();
   settings.own_column = false;
   EXPECT_TRUE(makeLearner(settings).personal().present.empty());
-  EXPECT_TRUE(makeLearner(smallSettings("inference")).personal().present.empty());
-  EXPECT_TRUE(makeLearner(smallSettings("none")).personal().present.empty());
+  EXPECT_TRUE(makeLearner(smallSac("inference")).personal().present.empty());
+  EXPECT_TRUE(makeLearner(smallSac("none")).personal().present.empty());
 }
 
 TEST(SacPersonalLearner, OneSeedOneResultWhateverIsEvaluated) {
   for (const char* encoding : {"one_hot", "inference"}) {
-    auto a = makeLearner(smallSettings(encoding)), b = makeLearner(smallSettings(encoding)),
-         other = makeLearner(smallSettings(encoding));
+    auto a = makeLearner(smallSac(encoding)), b = makeLearner(smallSac(encoding)),
+         other = makeLearner(smallSac(encoding));
     const Model meta = a.initialModel(1);
     for (int round = 1; round <= 3; ++round) {
       for (PersonalLearner* learner : {&a, &b, &other}) {
@@ -224,7 +224,7 @@ TEST(SacPersonalLearner, OneSeedOneResultWhateverIsEvaluated) {
 }
 
 TEST(SacPersonalLearner, NetworksWithLambdaZeroAreEachRobotsOwn) {
-  const SacSettings settings = smallSettings();
+  const SacSettings settings = smallSac();
   PersonalSettings personal = pulled();
   personal.lambdas.critic = 0;
   PersonalLearner learner = makeLearner(settings, 0, personal);
@@ -247,7 +247,7 @@ TEST(SacPersonalLearner, NetworksWithLambdaZeroAreEachRobotsOwn) {
 
 TEST(SacPersonalLearner, UpdatesAllocateNothing) {
   for (const char* encoding : {"one_hot", "inference"}) {
-    auto learner = makeLearner(smallSettings(encoding));
+    auto learner = makeLearner(smallSac(encoding));
     Rng rng(1, 0, Stream::kSample);
     learner.beginRound(learner.initialModel(1), false);
     run(learner, 1, rng);
@@ -258,7 +258,7 @@ TEST(SacPersonalLearner, UpdatesAllocateNothing) {
 }
 
 TEST(SacPersonalLearner, RefusesATaskThatIsNone) {
-  EXPECT_EQ(test::errorOf([] { makeLearner(smallSettings(), 3); }), "task 3 is none of 3.");
+  EXPECT_EQ(test::errorOf([] { makeLearner(smallSac(), 3); }), "task 3 is none of 3.");
 }
 
 // personal and meta-policy of three goals that conflict, told apart by a one-hot vector

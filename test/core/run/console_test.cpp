@@ -195,13 +195,14 @@ TEST(ListRunFolder, NamesWhatIsThere) {
   runLocally(experiment, &log);
   log.finish("finished");
   const std::vector<std::string> lines = linesOf(listRunFolder(log.dir()));
-  ASSERT_EQ(lines.size(), 5u);
+  ASSERT_EQ(lines.size(), 6u);
   EXPECT_EQ(lines[0], "results in " + log.dir());
   EXPECT_EQ(lines[1].rfind("  config.yaml     ", 0), 0u) << lines[1];
-  EXPECT_EQ(lines[2].rfind("  manifest.json   ", 0), 0u) << lines[2];
-  EXPECT_EQ(lines[3], "  policies/       6 files");
-  EXPECT_EQ(lines[4].rfind("  rounds.csv      ", 0), 0u) << lines[4];
-  EXPECT_EQ(lines[4].back(), 'B');
+  EXPECT_EQ(lines[2].rfind("  losses.csv      ", 0), 0u) << lines[2];
+  EXPECT_EQ(lines[3].rfind("  manifest.json   ", 0), 0u) << lines[3];
+  EXPECT_EQ(lines[4], "  policies/       6 files");
+  EXPECT_EQ(lines[5].rfind("  rounds.csv      ", 0), 0u) << lines[5];
+  EXPECT_EQ(lines[5].back(), 'B');
 }
 
 }  // namespace
