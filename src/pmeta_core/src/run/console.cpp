@@ -158,7 +158,8 @@ std::string RunConsole::table() const {
     return padded(policy + " last", kNumberWidth, true) +
            padded(policy + " best (round)", kBestWidth, true);
   };
-  std::string text = padded("task", width) + (has_personal_ ? heads("PP") : "") + heads("MP") + "\n";
+  std::string text =
+      padded("task", width) + (has_personal_ ? heads("PP") : "") + heads("MP") + "\n";
   for (std::size_t task = 0; task < tasks_.size(); ++task) {
     text += tableLine(labels[task], tasks_[task], width);
   }

@@ -55,7 +55,7 @@ class RunConsole {
 
   std::vector<std::string> names_;  ///< by task
   int num_tasks_;                   ///< training tasks
-  bool has_personal_;  // policies: none with a meta-learner
+  bool has_personal_;               // policies: none with a meta-learner
   int rounds_;
   int adapted_;  ///< exploration episodes behind MP
   bool terminal_;
