@@ -3,7 +3,6 @@
 import csv
 import os
 import statistics
-import sys
 
 import pytest
 
@@ -395,7 +394,3 @@ def test_a_page_says_who_wins_or_that_nothing_was_run(tmp_path):
     assert "* **grid**: PP of pMeta-RL at equal steps: above DELTA, GAMMA." in text
     assert "| PP of pMeta-RL | DELTA | 2, 2 | 880 | +" in text
     assert (folder / "figures/both/comparison.png").is_file()
-
-
-if __name__ == "__main__":
-    sys.exit(pytest.main([__file__]))

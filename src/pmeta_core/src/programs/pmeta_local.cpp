@@ -9,7 +9,6 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -22,7 +21,7 @@
 #include "pmeta_core/run/console.h"
 #include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/run/local_runner.h"
-#include "pmeta_core/run/meta_trainer.h"
+#include "pmeta_core/run/policy_evaluation.h"
 #include "pmeta_core/run/sweep.h"
 #include "pmeta_core/run/trace.h"
 #include "pmeta_core/security/authentication.h"
@@ -347,17 +346,10 @@ int evaluate(const Arguments& arguments) {
   }
   std::cout << policy.description() << std::endl;
   const int only = arguments.task < 0 ? policy.task() : arguments.task;
-  std::optional<pmeta::MetaTrainer> trainer;
-  if (experiment.hasMetaLearner()) trainer.emplace(experiment);
+  const pmeta::PolicyEvaluation evaluation(policy);
   for (int task = 0; task < experiment.totalTasks(); ++task) {
     if (only >= 0 && task != only) continue;
-    // what a personal policy knew of its task went with its agent: it explores anew
-    const bool explores = experiment.contextEpisodes().size() > 1;
-    const pmeta::PolicyKind kind = explores ? pmeta::PolicyKind::kMeta : policy.policy();
-    const pmeta::ReturnStats stats =
-        trainer ? trainer->evaluateFresh(policy.model(), task, arguments.episodes)
-                : pmeta::TaskAgent(experiment, task)
-                      .evaluateFresh(kind, policy.model(), arguments.episodes);
+    const pmeta::ReturnStats stats = evaluation.on(task, arguments.episodes);
     std::printf("task %d %s  return %s +- %s over %d episodes\n", task,
                 experiment.family().taskName(task).c_str(), shortNumber(stats.mean).c_str(),
                 shortNumber(stats.std).c_str(), stats.episodes);
