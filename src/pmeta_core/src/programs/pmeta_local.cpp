@@ -64,12 +64,9 @@ constexpr char kUsage[] =
                                        ant_model, half_cheetah_model, walker2d_model compare a file of
                                        figures of the compiled model instead.
   evaluate POLICY_FILE [--episodes N] [--task I]
-                                       returns of a trained policy (policies/*.safetensors of a run
-                                       folder) on fresh episodes, at least N (100), of its own task,
-                                       or of every task if it is a meta-policy
-  trace RUN_DIR                        write trajectories.csv there: one greedy episode of each of
-                                       its last policies, of the meta-policy on every task and after
-                                       each number of exploration episodes
+                                       returns of a trained policy (policies/*.safetensors) on at least
+                                       N (100) fresh episodes, of its own task or, meta, of every one
+  trace RUN_DIR                        write trajectories.csv there: an episode of each last policy
 
 Ctrl-C, SIGTERM or a closed terminal stops a run or a sweep when the round is over, a second one at
 once; other commands end at once. That nobody reads the output any more (| head) stops nothing.
@@ -82,8 +79,7 @@ constexpr char kAfterTheRound[] = "\nstopping when the round is over; once more 
 
 struct Arguments {
   std::vector<std::string> words;  ///< all that is neither an option nor ROS's own remapping
-  std::string name;
-  std::string tasks;
+  std::string name, tasks;
   int task = -1;  ///< -1: not given
   int episodes = 100;
   bool resume = false;
