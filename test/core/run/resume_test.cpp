@@ -303,6 +303,16 @@ TEST(Resume, WhatDefinesTheRunStandsInItsManifest) {
             std::string::npos);
 }
 
+TEST(Resume, WhatThereWasNoSettingOfHasItsDefault) {
+  const TempDir dir;
+  const Experiment experiment = checkpointExperiment("table", dir.path());
+  runUntilStopped(experiment, 3);
+  nlohmann::json manifest = manifestOf(experiment);
+  ASSERT_EQ(manifest["defining_settings"].erase("aggregation.outlier_factor"), 1u);
+  writeFile(experiment.runDir() + "/manifest.json", manifest.dump());
+  EXPECT_EQ(Experiment::definingSettingsOf(experiment.runDir()), experiment.definingSettings());
+}
+
 TEST(Resume, ACheckpointThatCannotBeWrittenStopsTheRunInOneSentence) {
   const TempDir dir;
   const Experiment experiment = checkpointExperiment("table", dir.path());

@@ -34,16 +34,17 @@ std::map<std::string, std::string> Experiment::definingSettingsOf(const std::str
   const auto manifest = std::filesystem::exists(path)
                             ? nlohmann::json::parse(readFile(path, "the manifest"), nullptr, false)
                             : nlohmann::json::object();
-  if (!manifest.is_object() || !manifest.contains("defining_settings")) {
-    // what there was no setting of then has its default
-    return load(run_dir + "/config.yaml").definingSettings();
-  }
+  // what there was no setting of then has its default
+  std::map<std::string, std::string> read = load(run_dir + "/config.yaml").definingSettings();
+  if (!manifest.is_object() || !manifest.contains("defining_settings")) return read;
   const nlohmann::json& settings = manifest["defining_settings"];
   const auto is_text = [](const nlohmann::json& value) { return value.is_string(); };
   if (!settings.is_object() || !std::all_of(settings.begin(), settings.end(), is_text)) {
     throw Error(path + " must hold a text for each of its defining_settings: it has been altered.");
   }
-  return settings.get<std::map<std::string, std::string>>();
+  auto recorded = settings.get<std::map<std::string, std::string>>();
+  recorded.merge(read);
+  return recorded;
 }
 
 std::string Experiment::settingsHash() const {
