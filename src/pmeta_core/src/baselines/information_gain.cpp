@@ -1,5 +1,7 @@
 #include "pmeta_core/baselines/information_gain.h"
 
+#include "pmeta_core/baselines/plain_adam.h"
+
 #include <algorithm>
 #include <string>
 #include <utility>
@@ -18,12 +20,6 @@ MlpSpec predictor(const char* prefix, const EnvSpec& env, int task_inputs,
   return spec;
 }
 
-ProximalAdamSettings adamSettings(double learning_rate) {
-  ProximalAdamSettings settings;
-  settings.learning_rate = learning_rate;
-  return settings;
-}
-
 std::size_t batchOf(const MetaCureSettings& settings) {
   return static_cast<std::size_t>(settings.meta_batch * settings.task_batch);
 }
@@ -38,7 +34,7 @@ InformationGain::Predictor::Predictor(MlpSpec spec, std::size_t batch, double le
       inputs(batch * network.inputs()),
       d_outputs(batch * network.outputs()),
       work(network, batch),
-      adam(parameters.data(), nullptr, parameters.size(), adamSettings(learning_rate)) {}
+      adam(parameters.data(), nullptr, parameters.size(), plainAdam(learning_rate)) {}
 
 // mean over the rows of predictionError(), before the step
 double InformationGain::Predictor::learn(const AlignedFloats& seen) {

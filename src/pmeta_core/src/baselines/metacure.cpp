@@ -5,16 +5,11 @@
 #include <string>
 
 #include "pmeta_core/baselines/for_each_task.h"
+#include "pmeta_core/baselines/plain_adam.h"
 #include "pmeta_core/baselines/replay_size.h"
 
 namespace pmeta {
 namespace {
-
-ProximalAdamSettings adamSettings(double learning_rate) {
-  ProximalAdamSettings settings;
-  settings.learning_rate = learning_rate;
-  return settings;
-}
 
 EnvSpec specOf(const MetaTasks& tasks) { return tasks.family->make(0)->spec(); }
 
@@ -40,7 +35,7 @@ MetaCure::MetaCure(const MetaTasks& tasks, const MetaCureSettings& settings)
       threads_(tasks.threads),
       policies_(specOf(tasks), settings),
       model_(policies_.layout()),
-      adam_(model_.floats().data(), nullptr, model_.size(), adamSettings(settings.learning_rate)),
+      adam_(model_.floats().data(), nullptr, model_.size(), plainAdam(settings.learning_rate)),
       exploiter_(networks().exploiter(), exploiterSettings(settings), {}),
       explorer_(networks().explorer(), explorerSettings(settings), {}),
       beliefs_(networks().encoder(), static_cast<std::size_t>(settings.meta_batch),

@@ -5,26 +5,17 @@
 
 #include "pmeta_core/adapt/latent_adaptation.h"
 #include "pmeta_core/baselines/for_each_task.h"
+#include "pmeta_core/baselines/plain_adam.h"
 #include "pmeta_core/baselines/replay_size.h"
 
 namespace pmeta {
-namespace {
-
-ProximalAdamSettings adam(double learning_rate) {
-  ProximalAdamSettings settings;
-  settings.learning_rate = learning_rate;
-  return settings;
-}
-
-}  // namespace
-
 Pearl::Pearl(const MetaTasks& tasks, const PearlSettings& settings)
     : settings_(settings),
       update_settings_(updateSettings(settings, tasks.family->make(0)->spec().horizon)),
       threads_(tasks.threads),
       policies_(tasks.family->make(0)->spec(), update_settings_, 1),
       model_(policies_.layout()),
-      optimizer_(model_.floats().data(), nullptr, model_.size(), adam(settings.learning_rate)),
+      optimizer_(model_.floats().data(), nullptr, model_.size(), plainAdam(settings.learning_rate)),
       update_(networks(), update_settings_, {}),
       losses_{{"critic", 0}, {"actor", 0}, {"entropy", 0}, {"temperature", 0}, {"kl", 0}} {
   if (networks().hasValue()) losses_.push_back({"value", 0});

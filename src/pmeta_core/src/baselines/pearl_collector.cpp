@@ -4,22 +4,12 @@
 #include <utility>
 
 namespace pmeta {
-namespace {
-
-std::vector<std::unique_ptr<Env>> one(std::unique_ptr<Env> env) {
-  std::vector<std::unique_ptr<Env>> envs;
-  envs.push_back(std::move(env));
-  return envs;
-}
-
-}  // namespace
-
 PearlCollector::PearlCollector(std::unique_ptr<Env> env, const SacNetworks& networks,
                                const SacSettings& settings, std::size_t buffer_size)
     : networks_(networks),
       gamma_(static_cast<float>(settings.gamma)),
       posterior_is_context_(settings.context.posterior_episodes),
-      rollout_(one(std::move(env)), Rollout::AtEnd::kStop, kForgiven),
+      rollout_(makeEnvs([&](int) { return std::move(env); }, 1), Rollout::AtEnd::kStop, kForgiven),
       replay_(buffer_size, static_cast<int>(networks.observationSize()),
               static_cast<int>(networks.actionSize())),
       context_(networks.encoder(), settings.context, static_cast<int>(networks.observationSize()),

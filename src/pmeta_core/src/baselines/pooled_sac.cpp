@@ -5,17 +5,12 @@
 #include "pmeta_core/adapt/told.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/baselines/for_each_task.h"
+#include "pmeta_core/baselines/plain_adam.h"
 
 namespace pmeta {
 namespace {
 
 const char* const kOneHot = "one_hot";
-
-ProximalAdamSettings adam(double learning_rate) {
-  ProximalAdamSettings settings;
-  settings.learning_rate = learning_rate;
-  return settings;
-}
 
 std::vector<float> inputOf(int task, int num_tasks, const SacSettings& settings) {
   return settings.task_encoding == kOneHot ? oneHot(task, num_tasks) : std::vector<float>();
@@ -75,7 +70,7 @@ PooledSac::PooledSac(const MetaTasks& tasks, const PooledSacSettings& settings)
       threads_(tasks.threads),
       policies_(tasks.family->make(0)->spec(), settings.sac, tasks.count()),
       model_(policies_.layout()),
-      optimizer_(model_.floats().data(), nullptr, model_.size(), adam(settings.learning_rate)),
+      optimizer_(model_.floats().data(), nullptr, model_.size(), plainAdam(settings.learning_rate)),
       update_(policies_.networks(), updateSettings(settings, tasks.count()), {}),
       losses_{{"critic", 0}, {"actor", 0}, {"entropy", 0}, {"temperature", 0}} {
   for (int i = 0; i < tasks.count(); ++i) {

@@ -6,16 +6,11 @@
 #include <utility>
 
 #include "pmeta_core/baselines/advantages.h"
+#include "pmeta_core/baselines/plain_adam.h"
 #include "pmeta_core/baselines/rl2_actor.h"
 
 namespace pmeta {
 namespace {
-
-ProximalAdamSettings adamSettings(const Rl2Settings& settings) {
-  ProximalAdamSettings adam;
-  adam.learning_rate = settings.learning_rate;
-  return adam;
-}
 
 std::size_t largestMinibatch(const Rl2Settings& settings) {
   return static_cast<std::size_t>((settings.trials + settings.minibatches - 1) /
@@ -37,7 +32,7 @@ Rl2::Rl2(const MetaTasks& tasks, const Rl2Settings& settings)
       num_tasks_(tasks.count()),
       policies_(specOf(tasks), settings),
       model_(policies_.layout()),
-      adam_(model_.floats().data(), nullptr, model_.size(), adamSettings(settings)),
+      adam_(model_.floats().data(), nullptr, model_.size(), plainAdam(settings.learning_rate)),
       sampler_(tasks, policies_.networks(), settings.episodes,
                static_cast<std::size_t>(settings.trials)),
       update_(policies_.networks(), ppoSettings(settings), largestMinibatch(settings),

@@ -4,23 +4,14 @@
 #include <utility>
 
 namespace pmeta {
-namespace {
-
-std::vector<std::unique_ptr<Env>> one(std::unique_ptr<Env> env) {
-  std::vector<std::unique_ptr<Env>> envs;
-  envs.push_back(std::move(env));
-  return envs;
-}
-
-}  // namespace
-
 SacCollector::SacCollector(std::unique_ptr<Env> env, const SacNetworks& networks,
                            const SacSettings& settings, std::vector<float> task_input,
                            ContextStore* context)
     : networks_(networks),
       settings_(settings),
       context_(context),
-      rollout_(one(std::move(env)), Rollout::AtEnd::kBeginAnother, kForgiven),
+      rollout_(makeEnvs([&](int) { return std::move(env); }, 1), Rollout::AtEnd::kBeginAnother,
+               kForgiven),
       replay_(static_cast<std::size_t>(settings.buffer_size),
               static_cast<int>(networks.observationSize()),
               static_cast<int>(networks.actionSize())),

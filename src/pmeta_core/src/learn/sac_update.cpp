@@ -201,9 +201,11 @@ double SacUpdate::updateCritic(int k, const float* parameters, Optimizer<float>&
   for (std::size_t b = 0; b < batch_; ++b) errors_[b] = q[b] - y_[b];
   const double loss = kernels().squaredLoss(errors_.data(), nullptr, d_q_.data(), batch_);
   const std::size_t latent = d_latent_rows_.size() / batch_;  // 0 where nobody wants it
-  critic.backward(theta, critic_input_.data(), batch_, d_q_.data(), gradient_.data(),
-                  observation_size_, latent, latent == 0 ? nullptr : d_latent_rows_.data(),
-                  workspace);
+  if (!surgery_ || latent > 0) {
+    critic.backward(theta, critic_input_.data(), batch_, d_q_.data(), gradient_.data(),
+                    observation_size_, latent, latent == 0 ? nullptr : d_latent_rows_.data(),
+                    workspace);
+  }
   if (surgery_) operateOn(critic, theta, critic_input_.data(), d_q_.data(), rng);
   for (std::size_t i = 0; i < d_task_input_.size(); ++i) d_task_input_[i] += d_latent_rows_[i];
   for (std::size_t b = 0; b < batch_ && !tasks_.empty(); ++b) {
