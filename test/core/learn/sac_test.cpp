@@ -208,7 +208,7 @@ TEST(Sac, GreedyActionsAreTanhOfTheMean) {
 }
 
 TEST(Sac, OneSeedOneResult) {
-  for (const char* encoding : {"none", "inference"}) {
+  for (const char* encoding : {"none", "model", "inference"}) {
     Trainer a(smallSettings(encoding), 7), b(smallSettings(encoding), 7),
         c(smallSettings(encoding), 8);
     for (int i = 0; i < 50; ++i) {
@@ -222,7 +222,7 @@ TEST(Sac, OneSeedOneResult) {
 }
 
 TEST(Sac, GoesOnFromItsState) {
-  for (const char* encoding : {"one_hot", "inference"}) {
+  for (const char* encoding : {"one_hot", "model", "inference"}) {
     SacSettings settings = smallSettings(encoding);
     settings.buffer_size = 100;  // turned over
     Trainer a(settings, 7), b(settings, 9);
@@ -237,8 +237,10 @@ TEST(Sac, GoesOnFromItsState) {
 }
 
 TEST(Sac, UpdatesAndStepsAllocateNothing) {
-  for (const char* encoding : {"none", "one_hot", "inference"}) {
-    Trainer trainer(smallSettings(encoding));
+  for (const char* encoding : {"none", "one_hot", "model", "inference"}) {
+    SacSettings settings = smallSettings(encoding);
+    settings.task_model.explored_to_replay = true;
+    Trainer trainer(settings);
     trainer.optimizer.offsets.reserve(10000);
     trainer.update();
     const std::size_t before = test::allocations();
@@ -335,7 +337,7 @@ TEST(Sac, RefusesWhatItCannotDo) {
   EXPECT_EQ(test::errorOf(
                 [] { SacLearner(std::make_unique<PushedPoint>(), smallSettings(), oneHot(0, 2)); }),
             "soft actor-critic takes a task input of 2 numbers with task_encoding 'none': give the "
-            "one-hot vector with one_hot, and nothing otherwise.");
+            "one-hot vector with one_hot and model, and nothing otherwise.");
   EXPECT_EQ(test::errorOf([] { oneHot(3, 3); }), "task 3 is none of 3.");
   Trainer trainer(smallSettings());
   EXPECT_EQ(test::errorOf([&] {

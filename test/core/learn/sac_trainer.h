@@ -69,6 +69,9 @@ inline SacSettings smallSettings(const std::string& task_encoding = "none") {
   settings.context.latent_size = 3;
   settings.context.batch_size = 10;
   settings.context.buffer_size = 60;
+  settings.task_model.hidden = {7, 5};
+  settings.task_model.buffer_size = 500;
+  settings.task_model.exploring_interval = 2;
   return settings;
 }
 
@@ -109,7 +112,7 @@ inline std::vector<double> greedyAction(const SacNetworks& networks, const float
 }
 
 inline std::vector<float> taskInput(const SacSettings& settings) {
-  return settings.task_encoding == "one_hot" ? oneHot(1, 3) : std::vector<float>();
+  return settings.isTold() ? oneHot(1, 3) : std::vector<float>();
 }
 
 struct Trainer {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pmeta_core/adapt/latent_adaptation.h"
+#include "pmeta_core/adapt/model_adaptation.h"
 #include "pmeta_core/learn/sac.h"
 #include "pmeta_core/personal/personal_learner.h"
 
@@ -58,6 +59,9 @@ inline SacSettings smallSac(const std::string& task_encoding = "one_hot") {
   settings.context.latent_size = 2;
   settings.context.batch_size = 10;
   settings.context.buffer_size = 50;
+  settings.task_model.hidden = {7, 5};
+  settings.task_model.buffer_size = 150;
+  settings.task_model.exploring_interval = 2;
   settings.evaluation_episodes = 4;
   return settings;
 }
@@ -83,13 +87,18 @@ inline PersonalLearner makeLearner(const SacSettings& settings = smallSac(), int
                                    const PersonalSettings& personal = pulled()) {
   const auto make_env = [task](int) { return std::make_unique<Goal>(task - 1); };
   auto learner = std::make_unique<SacLearner>(
-      make_env(0), settings,
-      settings.task_encoding == "one_hot" ? oneHot(task, kTasks) : std::vector<float>());
+      make_env(0), settings, settings.isTold() ? oneHot(task, kTasks) : std::vector<float>());
   PersonalParts parts;
   if (learner->networks().hasEncoder()) {
     parts.exploration_episodes = settings.context.exploration_episodes;
     parts.adapt = [&networks = learner->networks(), context = settings.context](const Model& m) {
       return std::make_unique<LatentAdaptation>(networks, context, m.floats().data());
+    };
+  }
+  if (learner->networks().hasTaskModel()) {
+    parts.exploration_episodes = settings.context.exploration_episodes;
+    parts.adapt = [&networks = learner->networks(), settings](const Model& m) {
+      return std::make_unique<ModelAdaptation>(networks, settings, m.floats().data());
     };
   }
   parts.learner = std::move(learner);

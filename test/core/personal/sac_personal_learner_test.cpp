@@ -201,7 +201,7 @@ TEST(SacPersonalLearner, EverythingIsPresentWithoutOwnColumns) {
 }
 
 TEST(SacPersonalLearner, OneSeedOneResultWhateverIsEvaluated) {
-  for (const char* encoding : {"one_hot", "inference"}) {
+  for (const char* encoding : {"one_hot", "model", "inference"}) {
     auto a = makeLearner(smallSac(encoding)), b = makeLearner(smallSac(encoding)),
          other = makeLearner(smallSac(encoding));
     const Model meta = a.initialModel(1);
@@ -214,7 +214,7 @@ TEST(SacPersonalLearner, OneSeedOneResultWhateverIsEvaluated) {
         Rng evaluation(7, 0, Stream::kEvaluate);
         learner->evaluate(learner->personal(), evaluation);
         learner->record(meta, evaluation);
-        if (sac(*learner).networks().hasEncoder()) learner->evaluateAdapted(meta, evaluation);
+        learner->evaluateAdapted(meta, evaluation);
       }
     }
     EXPECT_EQ(a.personal().checksum(), b.personal().checksum());
@@ -246,7 +246,7 @@ TEST(SacPersonalLearner, NetworksWithLambdaZeroAreEachRobotsOwn) {
 }
 
 TEST(SacPersonalLearner, UpdatesAllocateNothing) {
-  for (const char* encoding : {"one_hot", "inference"}) {
+  for (const char* encoding : {"one_hot", "model", "inference"}) {
     auto learner = makeLearner(smallSac(encoding));
     Rng rng(1, 0, Stream::kSample);
     learner.beginRound(learner.initialModel(1), false);

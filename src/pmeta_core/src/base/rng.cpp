@@ -29,6 +29,11 @@ Rng::Rng(std::uint64_t seed, std::uint64_t task, Stream stream, std::uint64_t ro
   }
 }
 
+Rng Rng::branch(Stream stream) const {
+  Rng next = *this;
+  return Rng(next(), 0, stream);
+}
+
 Rng::result_type Rng::operator()() {
   const std::uint64_t result = rotl(state_[0] + state_[3], 23) + state_[0];
   const std::uint64_t t = state_[1] << 17;

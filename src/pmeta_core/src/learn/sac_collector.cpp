@@ -4,21 +4,20 @@
 #include <utility>
 
 namespace pmeta {
+
 SacCollector::SacCollector(std::unique_ptr<Env> env, const SacNetworks& networks,
                            const SacSettings& settings, std::vector<float> task_input,
-                           ContextStore* context)
+                           TaskSource* source)
     : networks_(networks),
       settings_(settings),
-      context_(context),
+      source_(source),
       rollout_(makeEnvs([&](int) { return std::move(env); }, 1), Rollout::AtEnd::kBeginAnother,
                kForgiven),
       replay_(static_cast<std::size_t>(settings.buffer_size),
               static_cast<int>(networks.observationSize()),
               static_cast<int>(networks.actionSize())),
       acting_(networks.actor(), std::move(task_input), 1, GaussianActor::By::kSample),
-      action_(networks.actionSize()) {
-  if (context_ != nullptr) task_.emplace(networks.encoder(), settings.context);
-}
+      action_(networks.actionSize()) {}
 
 std::int64_t SacCollector::collect(const float* parameters, Rng& rng, const float* explorer) {
   parameters_ = parameters;
@@ -40,22 +39,15 @@ std::int64_t SacCollector::collect(const float* parameters, Rng& rng, const floa
 }
 
 void SacCollector::begin(std::size_t, Rng& rng) {
-  // while no step has become context there is nothing else to draw from
-  prior_episode_ = random_ || context_ == nullptr || context_->kept().size() == 0 ||
-                   episodes_ % settings_.context.prior_interval == 0;
-  episodes_ += random_ ? 0 : 1;
-  if (context_ == nullptr) return;
-  if (prior_episode_) {
-    for (float& z : acting_.taskInput()) z = static_cast<float>(rng.normal());
-    return;
-  }
-  context_->draw(parameters_ + networks_.encoderOffset(), rng, *task_);
-  acting_.taskInput() = task_->z;
+  if (source_ == nullptr) return;
+  std::optional<std::int64_t> episode;
+  if (!random_) episode = episodes_++;
+  explores_ = source_->begin(episode, parameters_, rng, acting_.taskInput());
 }
 
 void SacCollector::look(const float* observations, const std::vector<std::size_t>& envs) {
   if (random_) return;
-  acting_.use(prior_episode_ && explorer_ != nullptr ? explorer_ : parameters_);
+  acting_.use(explores_ && explorer_ != nullptr ? explorer_ : parameters_);
   acting_.look(observations, envs);
 }
 
@@ -69,20 +61,19 @@ bool SacCollector::act(std::size_t row, Rng& rng, double* action) {
 
 void SacCollector::observe(const Experience& e) {
   std::copy_n(e.action, action_.size(), action_.begin());
-  Transition transition{e.observation, action_.data(), static_cast<float>(e.step.reward),
+  Transition transition{e.observation, action_.data(), static_cast<float>(e.step.evaluatedReward()),
                         e.step.terminated ? 0.0f : static_cast<float>(settings_.gamma),
                         e.next_observation};
+  if (source_ != nullptr && !source_->observe(transition, explores_)) return;
+  transition.reward = static_cast<float>(e.step.reward);
   replay_.add(transition);
-  if (context_ == nullptr || !(prior_episode_ || settings_.context.posterior_episodes)) return;
-  transition.reward = static_cast<float>(e.step.evaluatedReward());
-  context_->add(transition);
 }
 
 void SacCollector::saveState(StateWriter& writer) const {
   writer.flag("started", started_);
   writer.count("episodes", episodes_);
   writer.part("broken", rollout_.broken());
-  writer.flag("prior_episode", prior_episode_);
+  writer.flag("prior_episode", explores_);
   writer.part("replay", replay_);
   if (!started_) return;
   writer.array("task_input", taskInput());
@@ -93,13 +84,13 @@ void SacCollector::loadState(StateReader& reader) {
   started_ = reader.flag("started");
   episodes_ = reader.count("episodes");
   reader.part("broken", rollout_.broken());
-  prior_episode_ = reader.flag("prior_episode");
+  explores_ = reader.flag("prior_episode");
   reader.part("replay", replay_);
   if (!started_) return;
   if (replay_.size() == 0) reader.refuse("replay", "is empty after the start");
   std::vector<float> task_input(taskInput().size());
   reader.array("task_input", task_input);
-  if (context_ == nullptr && task_input != taskInput()) {
+  if (source_ == nullptr && task_input != taskInput()) {
     reader.refuse("task_input", "is that of another task");
   }
   acting_.taskInput() = std::move(task_input);

@@ -13,7 +13,7 @@ namespace {
 
 std::size_t taskInputs(const SacSettings& settings, int num_tasks) {
   if (settings.task_encoding == "none") return 0;
-  if (settings.task_encoding == "inference") {
+  if (settings.infers()) {
     return static_cast<std::size_t>(settings.context.latent_size);
   }
   if (num_tasks < 1) throw Error("a one-hot task input needs the number of tasks, at least one.");
@@ -77,13 +77,18 @@ SacNetworks::SacNetworks(const EnvSpec& env, const SacSettings& settings, int nu
   if (settings.backbone == "value") {
     value_.emplace(network("value", settings, actor_.inputs(), 1));
   }
-  if (settings.task_encoding == "inference") {
+  if (settings.infers()) {
     encoder_.emplace(env.observation_size, env.action_size, settings.context);
+  }
+  if (settings.models()) {
+    task_model_.emplace(env.observation_size, env.action_size, task_input_size_,
+                        settings.task_model, settings.portable);
   }
 }
 
 std::size_t SacNetworks::size() const {
-  return encoderOffset() + (hasEncoder() ? encoder_->network().size() : 0);
+  return encoderOffset() + (hasEncoder() ? encoder_->network().size() : 0) +
+         (hasTaskModel() ? task_model_->size() : 0);
 }
 
 std::vector<Block> SacNetworks::blocks() const {
@@ -96,6 +101,24 @@ std::vector<Block> SacNetworks::blocks() const {
   append(critic2_);
   if (hasValue()) append(*value_);
   if (hasEncoder()) append(encoder_->network());
+  if (hasTaskModel()) {
+    const std::vector<Block> model = task_model_->blocks();
+    all.insert(all.end(), model.begin(), model.end());
+  }
+  return all;
+}
+
+std::vector<std::size_t> SacNetworks::taskWeights() const {
+  std::vector<std::size_t> all;
+  const auto append = [&](const Mlp& mlp, std::size_t offset, std::size_t column) {
+    // the first block is the first layer's weight, [outputs, inputs]
+    for (std::size_t o = 0; o < mlp.blocks().front().shape[0]; ++o) {
+      all.push_back(offset + o * mlp.inputs() + column);
+    }
+  };
+  append(actor_, 0, observation_size_);
+  for (int k = 0; k < 2; ++k) append(critic(k), criticOffset(k), observation_size_);
+  if (hasTaskModel()) append(task_model_->network(), taskModelOffset(), task_model_->rowSize());
   return all;
 }
 
@@ -111,6 +134,11 @@ void SacNetworks::initialise(float* parameters, Rng& rng) const {
   for (int k = 0; k < 2; ++k) draw(critic(k), criticOffset(k), 3e-3);
   if (hasValue()) draw(*value_, valueOffset(), 3e-3);
   if (hasEncoder()) draw(encoder_->network(), encoderOffset(), 3e-3);
+  if (!hasTaskModel()) return;
+  task_model_->initialise(parameters + taskModelOffset(), rng);
+  for (const std::size_t weights : taskWeights()) {
+    std::fill_n(parameters + weights, task_input_size_, 0.0f);
+  }
 }
 
 SacPolicies::SacPolicies(const EnvSpec& env, const SacSettings& settings, int num_tasks)

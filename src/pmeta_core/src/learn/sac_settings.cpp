@@ -18,9 +18,11 @@ void bind(Settings& s, const std::string& prefix, SacSettings& d) {
          "environment steps before each update", Range::between(1, 1e6));
   bind(s, prefix, d.temperature);
   s.bind(prefix + "task_encoding", d.task_encoding,
-         "what tells the networks the task: inference (from recent transitions), one_hot or none",
-         {"inference", "one_hot", "none"});
+         "what tells the networks the task: one_hot (its number), model (the same in training; a "
+         "meta-policy finds it out by a learnt model), inference (from recent transitions) or none",
+         {"one_hot", "model", "inference", "none"});
   bind(s, prefix, d.context);
+  pmeta::bind(s, prefix + "task_model.", d.task_model);
   s.bind(prefix + "evaluation_episodes", d.evaluation_episodes,
          "episodes of one evaluation, without exploration", Range::between(1, 100000));
   s.bind(prefix + "targets_at_round", d.targets_at_round,
@@ -28,7 +30,7 @@ void bind(Settings& s, const std::string& prefix, SacSettings& d) {
          {"keep", "meta"});
   s.bind(prefix + "reset_moments", d.reset_moments, "Adam's moments begin anew with each round");
   s.bind(prefix + "own_column", d.own_column,
-         "with one_hot: a task's own input column is aggregated from that task alone");
+         "with one_hot and model: a task's own input column is aggregated from that task alone");
 }
 
 }  // namespace pmeta

@@ -14,6 +14,7 @@ enum class Stream : std::uint64_t {
   kEvaluate = 5,      ///< evaluation episodes
   kMeasure = 6,       ///< measurements on the side (theory, benchmarks)
   kTestTaskDraw = 7,  ///< which tasks a family holds for test
+  kTaskModel = 8,     ///< drawing training samples of a task model
 };
 
 /// Seeded generator xoshiro256++ (Blackman and Vigna, 2019), keyed by (seed, task, stream, round).
@@ -31,6 +32,9 @@ class Rng {
   static constexpr result_type min() { return 0; }  ///< least of the values of operator()
   /// Greatest of the values of operator().
   static constexpr result_type max() { return ~std::uint64_t{0}; }
+
+  /// A stream of its own that depends on where this one is, which does not move.
+  Rng branch(Stream stream) const;
 
   /// The next 64 random bits.
   result_type operator()();

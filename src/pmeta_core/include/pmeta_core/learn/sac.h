@@ -11,17 +11,21 @@
 #include "pmeta_core/learn/sac_networks.h"
 #include "pmeta_core/learn/sac_settings.h"
 #include "pmeta_core/learn/sac_update.h"
+#include "pmeta_core/learn/task_model_update.h"
+#include "pmeta_core/learn/task_source.h"
 
 namespace pmeta {
 
 /// Soft actor-critic on one task with continuous actions in [-1, 1]: SacUpdate on uniform batches
-/// of what a SacCollector has kept, with a ContextStore where there is an encoder.
+/// of what a SacCollector has kept, with a ContextStore where there is an encoder, and a
+/// TaskModelUpdate where there is a task model. The latter draws from a stream of its own: actor
+/// and critics are the same with and without it, as long as no episode explores.
 ///
 /// discount of a transition is gamma, 0 after a terminal state; the horizon is none.
 class SacLearner : public Learner {
  public:
-  /// `task_input`: the one-hot vector with task_encoding "one_hot", else empty. Throws Error where
-  /// SacNetworks does, or if the task input does not fit the encoding.
+  /// `task_input`: with task_encoding "one_hot" or "model" the one-hot vector, else empty. Throws
+  /// Error where SacNetworks does, or if the task input does not fit the encoding.
   SacLearner(std::unique_ptr<Env> env, const SacSettings& settings,
              std::vector<float> task_input = {});
 
@@ -38,7 +42,8 @@ class SacLearner : public Learner {
   SacLosses update(const float* parameters, Optimizer<float>& optimizer, Rng& rng);
 
   const PolicyFamily& policies() const override { return policies_; }
-  /// With one_hot and own_column, the columns of the other tasks' entries are absent.
+  /// With own_column, where it is told the task, the columns of the other tasks' entries are
+  /// absent.
   Model blank() const override;
   /// The first meta-policy's critics are also the first targets.
   void beginRound(const Model& meta, bool first) override;
@@ -61,7 +66,9 @@ class SacLearner : public Learner {
   const AlignedFloats& targets() const { return update_.targets(); }
   /// Transitions, warm-up included.
   const ReplayBuffer& replay() const { return collector_.replay(); }
-  const ContextStore& context() const { return *context_; }   ///< only with an encoder
+  const ContextStore& context() const { return *context_; }  ///< only with an encoder
+  /// What the task model learns from, with the reward that policies are judged by; only with one.
+  const ReplayBuffer& modelled() const { return *modelled_; }
   std::int64_t updates() const { return update_.updates(); }  ///< calls of update() so far
   /// Training episodes so far whose simulation broke down.
   std::int64_t brokenEpisodes() const { return collector_.brokenEpisodes(); }
@@ -71,13 +78,19 @@ class SacLearner : public Learner {
   void loadState(StateReader& reader) override;
 
  private:
-  void report(const SacLosses& losses);
+  std::unique_ptr<TaskSource> makeSource(const std::vector<float>& task_input);
+  double updateModel(const float* parameters, Optimizer<float>& optimizer, Rng rng);
+  void report(const SacLosses& losses, double model_loss);
 
   SacSettings settings_;
+  std::vector<float> own_input_;  // as it is told in training; empty where it is not
   SacPolicies policies_;
   std::optional<ContextStore> context_;
+  std::optional<ReplayBuffer> modelled_;
+  std::unique_ptr<TaskSource> source_;
   SacCollector collector_;
   SacUpdate update_;
+  std::optional<TaskModelUpdate> model_update_;
   std::vector<float> explorer_;  // the meta-policy's actor of the round, where it explores
   std::vector<Loss> losses_;
 };

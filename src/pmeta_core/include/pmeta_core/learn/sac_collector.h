@@ -2,35 +2,32 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "pmeta_core/act/gaussian_actor.h"
 #include "pmeta_core/act/rollout.h"
-#include "pmeta_core/learn/context_store.h"
 #include "pmeta_core/learn/sac_networks.h"
 #include "pmeta_core/learn/sac_settings.h"
+#include "pmeta_core/learn/task_source.h"
 #include "pmeta_core/replay/replay_buffer.h"
 
 namespace pmeta {
 
 /// Acts in one environment by samples of the policy that soft actor-critic trains, and keeps what
-/// comes of it in the replay and, with an encoder, as context.
+/// comes of it in the replay; a TaskSource may tell the actor the task anew for each episode.
 class SacCollector : private Actor {
  public:
   /// Episodes running that may break down.
   static constexpr int kForgiven = 9;
 
-  /// `task_input`: x of the actor, where no encoder infers it. `context`: where transitions become
-  /// context; nullptr without an encoder. The networks and it must outlive the collector.
+  /// `task_input`: x of the actor, for good where `source` is nullptr. The networks and the source
+  /// must outlive the collector.
   SacCollector(std::unique_ptr<Env> env, const SacNetworks& networks, const SacSettings& settings,
-               std::vector<float> task_input, ContextStore* context);
+               std::vector<float> task_input, TaskSource* source);
 
   /// env_steps_per_update steps; the first call also starts the environment and warms it up by
-  /// uniformly random actions. With an encoder, z is drawn anew for each episode: from the prior in
-  /// every prior_interval-th, else from q(z|c). On z from the prior `explorer` acts, if not null:
-  /// another actor's parameters. Those transitions become context, and with posterior_episodes all
-  /// do, in the reward that policies are judged by.
+  /// uniformly random actions. In episodes that explore, by what the source says, `explorer` acts,
+  /// if not null: another actor's parameters.
   /// An episode that breaks down is counted, and another begun; of its last step nothing is kept.
   /// Returns the transitions made. Allocates nothing once the buffers are full.
   std::int64_t collect(const float* parameters, Rng& rng, const float* explorer);
@@ -42,7 +39,7 @@ class SacCollector : private Actor {
   /// Episodes so far whose simulation broke down.
   std::int64_t brokenEpisodes() const { return rollout_.broken().count(); }
 
-  /// Replay, counts and the episode at hand; the context is its store's.
+  /// Replay, counts and the episode at hand, without what the source keeps.
   void saveState(StateWriter& writer) const;
   /// Refuses an empty replay after the start, and another task's input.
   void loadState(StateReader& reader);
@@ -55,15 +52,14 @@ class SacCollector : private Actor {
 
   const SacNetworks& networks_;
   SacSettings settings_;
-  ContextStore* context_;
-  std::optional<InferredTask> task_;
+  TaskSource* source_;
   Rollout rollout_;
   ReplayBuffer replay_;
   GaussianActor acting_;
   std::vector<float> action_;
   std::int64_t episodes_ = 0;  // after the warm-up
   bool started_ = false;
-  bool prior_episode_ = true;  // this episode's transitions become context
+  bool explores_ = false;  // the episode at hand
   // of the call of collect()
   const float* parameters_ = nullptr;
   const float* explorer_ = nullptr;

@@ -9,6 +9,7 @@
 #include "pmeta_core/env/env.h"
 #include "pmeta_core/learn/context_encoder.h"
 #include "pmeta_core/learn/sac_settings.h"
+#include "pmeta_core/learn/task_model.h"
 #include "pmeta_core/nn/mlp.h"
 
 namespace pmeta {
@@ -18,7 +19,7 @@ std::vector<float> oneHot(int task, int num_tasks);
 
 /// The networks of soft actor-critic, whose parameters lie in one flat vector as the blocks
 /// "actor.*", "critic1.*", "critic2.*", with backbone "value" "value.*" and, with task_encoding
-/// "inference", "encoder.*".
+/// "inference", "encoder.*", or with "model" "task_model.*".
 ///
 /// The actor takes [observation, task input] and gives the heads of a GaussianPolicy; a critic
 /// takes [observation, task input, action], the value network what the actor takes. The task input
@@ -43,7 +44,13 @@ class SacNetworks {
   std::size_t valueOffset() const { return criticOffset(1) + critic2_.size(); }
   /// After all others, whether there is an encoder or not.
   std::size_t encoderOffset() const { return valueOffset() + (hasValue() ? value_->size() : 0); }
-  std::size_t size() const;           ///< number of all parameters
+  bool hasTaskModel() const { return task_model_.has_value(); }    ///< with task_encoding "model"
+  const TaskModel& taskModel() const { return *task_model_; }      ///< only where hasTaskModel()
+  std::size_t taskModelOffset() const { return encoderOffset(); }  ///< in the encoder's place
+  std::size_t size() const;                                        ///< number of all parameters
+  /// Where in the parameters the taskInputSize() weights of the task input begin, for every unit of
+  /// the first layers of actor, critics and task model.
+  std::vector<std::size_t> taskWeights() const;
   std::vector<Block> blocks() const;  ///< of all, in order
 
   std::size_t observationSize() const { return observation_size_; }  ///< numbers of an observation
@@ -55,7 +62,8 @@ class SacNetworks {
   /// Each network as Mlp::initialise() does. With initialisation "rlkit" as the library of that
   /// name, with which PEARL was released: hidden weights from U(-b, b), b = 1 / sqrt(outputs of the
   /// layer), hidden biases 0.1, and the last layer from U(-0.003, 0.003), the actor's a third of
-  /// it.
+  /// it. With a task model the weights of the task input are 0 in all networks, so that tasks
+  /// part only where they must, and those between two of them make sense.
   void initialise(float* parameters, Rng& rng) const;
 
  private:
@@ -67,6 +75,7 @@ class SacNetworks {
   Mlp actor_, critic1_, critic2_;
   std::optional<Mlp> value_;
   std::optional<ContextEncoder> encoder_;
+  std::optional<TaskModel> task_model_;
 };
 
 /// Policies of those networks: tanh(mean) of the actor.

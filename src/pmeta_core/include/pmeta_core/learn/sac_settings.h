@@ -6,6 +6,7 @@
 #include "pmeta_core/act/gaussian_policy.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/learn/context_encoder.h"
+#include "pmeta_core/learn/task_model.h"
 #include "pmeta_core/learn/temperature.h"
 
 namespace pmeta {
@@ -21,13 +22,15 @@ struct SacSettings {
   int warm_up_steps = 1000;              ///< uniformly random steps before the first update
   int env_steps_per_update = 1;          ///< environment steps before each update
   TemperatureSettings temperature;       ///< weight of the entropy
-  /// What tells the networks the task besides the observation: "inference" (a latent vector that
-  /// the context encoder infers), "one_hot" (the task's number), "none", or, for learners that make
-  /// the input themselves, "given".
+  /// What tells the networks the task besides the observation: "one_hot" (the task's number),
+  /// "model" (the same, and a model that is learnt of the tasks finds it out at test time),
+  /// "inference" (a latent vector that the context encoder infers), "none", or, for learners that
+  /// make the input themselves, "given".
   std::string task_encoding = "one_hot";
-  ContextSettings context;      ///< with task_encoding "inference"
-  int evaluation_episodes = 5;  ///< episodes of one evaluation, by tanh(mean)
-  bool portable = false;        ///< see MlpSpec; set by the experiment's `arithmetic`
+  ContextSettings context;       ///< with task_encoding "inference"; exploration with "model", too
+  TaskModelSettings task_model;  ///< with task_encoding "model"
+  int evaluation_episodes = 5;   ///< episodes of one evaluation, by tanh(mean)
+  bool portable = false;         ///< see MlpSpec; set by the experiment's `arithmetic`
 
   // what baselines alone have a choice of
   /// What next states are worth by: "twin", target copies of both critics, or "value", a target
@@ -45,9 +48,14 @@ struct SacSettings {
   // what a round does besides resetting parameters
   std::string targets_at_round = "keep";  ///< target critics: "keep", or "meta": the meta-policy's
   bool reset_moments = false;             ///< Adam's moments begin anew
-  /// With one_hot: the first layers' column of a task's own entry is that task's alone, and
-  /// aggregation takes it from there.
+  /// With one_hot and model: the first layers' column of a task's own entry is that task's alone,
+  /// and aggregation takes it from there.
   bool own_column = true;
+
+  /// While training, the networks are told the task's number.
+  bool isTold() const { return task_encoding == "one_hot" || models(); }
+  bool infers() const { return task_encoding == "inference"; }  ///< with the context encoder
+  bool models() const { return task_encoding == "model"; }      ///< with a TaskModel
 };
 
 /// Binds all of them below `prefix`, e.g. "sac.".

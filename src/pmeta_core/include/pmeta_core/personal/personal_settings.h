@@ -11,13 +11,13 @@ namespace pmeta {
 struct NetworkLambdas {
   std::optional<double> actor;    ///< of the policy's network
   std::optional<double> critic;   ///< of all critics
-  std::optional<double> encoder;  ///< of the inference network
+  std::optional<double> encoder;  ///< of the inference network, or the task model
 
   /// That of the network whose blocks are named "<network>.<...>".
   std::optional<double> of(const std::string& network) const {
     if (network.rfind("critic", 0) == 0) return critic;
     if (network == "actor") return actor;
-    return network == "encoder" ? encoder : std::nullopt;
+    return network == "encoder" || network == "task_model" ? encoder : std::nullopt;
   }
 };
 
