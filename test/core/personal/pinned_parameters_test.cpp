@@ -67,6 +67,11 @@ INSTANTIATE_TEST_SUITE_P(
                1897786678u},
         Pinned{"SacAlone", "sac.task_encoding: none, reset_moments: true, temperature: fixed",
                2054386790u, 1866931286u},
+        Pinned{
+            "SacModel",
+            "sac.task_encoding: model, task_model: {hidden: [6], exploring_interval: 2, dynamics: "
+            "true}",
+            1400345036u, 3027868810u},
         Pinned{"SacInference", "sac.task_encoding: inference, contexts_per_update: 2", 1422353265u,
                1836010079u},
         Pinned{"SacInferenceWithEverything",

@@ -131,6 +131,61 @@ TEST(LoadedPolicy, ActsOnTheLatentVectorOfItsFile) {
   actionOf(meta, 0.1, 0.2);
 }
 
+// what the run's own evaluation finds out, with the same draws
+TEST(LoadedPolicy, ExploresAsEvaluationDoesAndThenActsOnWhatItFound) {
+  for (const char* encoding : {"model", "inference"}) {
+    const Trained run(point(encoding));
+    LoadedPolicy policy(run.policies + "meta.safetensors");
+    EXPECT_FALSE(policy.exploring());
+    ASSERT_TRUE(policy.explore(7));
+    EXPECT_EQ(policy.explorationEpisodes(), 2);
+
+    Rng rng(7, 0, Stream::kEvaluate);
+    const std::unique_ptr<Env> env = run.experiment.family().make(4);
+    const std::unique_ptr<PolicyFamily> policies = run.experiment.policies(*env);
+    const auto adaptation = run.experiment.adaptation(*policies, policy.model());
+    for (int episode = 1; episode <= 3; ++episode) {
+      std::unique_ptr<Actor> adapted;
+      adaptation->beginEpisode(rng);
+      if (episode == 3) adapted = adaptation->adapted(1);
+      Actor& actor = adapted ? *adapted : *adaptation;
+      policy.beginEpisode();
+      EXPECT_EQ(policy.episode(), episode);
+      EXPECT_EQ(policy.exploring(), episode < 3);
+      EXPECT_EQ(policy.observes(), episode < 3);
+      std::vector<double> observation = {0.1 * episode, 0.2}, next(2), action(2), expected(2);
+      for (int t = 0; t < 10; ++t) {
+        const std::vector<float> seen(observation.begin(), observation.end());
+        actor.look(seen.data(), {0});
+        ASSERT_TRUE(actor.act(0, rng, expected.data()));
+        ASSERT_TRUE(policy.act(observation.data(), action.data()));
+        EXPECT_EQ(action, expected) << encoding << ", episode " << episode << ", step " << t;
+        next = {observation[0] + 0.1 * action[0], observation[1] + 0.1 * action[1]};
+        const std::vector<float> next_seen(next.begin(), next.end());
+        actor.observe({0, seen.data(), expected.data(), Step{next[0]}, next_seen.data()});
+        ASSERT_TRUE(policy.observe(next[0], next.data()));
+        observation = next;
+      }
+      if (!adapted) adaptation->episodeOver();
+      EXPECT_EQ(policy.taskWeights(), adaptation->taskWeights());
+    }
+    const double somewhere[] = {0, 0};
+    EXPECT_FALSE(policy.observe(std::nan(""), somewhere));
+  }
+}
+
+TEST(LoadedPolicy, OnlyAMetaPolicyThatIsNotToldItsTaskExplores) {
+  const Trained run(point("model"));
+  LoadedPolicy personal(run.policies + "task_1.safetensors");
+  EXPECT_FALSE(personal.explore(0));
+  LoadedPolicy told(run.policies + "meta.safetensors", 1);
+  EXPECT_FALSE(told.explore(0));
+  const double observation[] = {0.1, 0.2};
+  EXPECT_FALSE(told.observe(1, observation));
+  EXPECT_TRUE(told.taskWeights().empty());
+  EXPECT_EQ(actionOf(told, 0.1, 0.2), actionOf(told, 0.1, 0.2));
+}
+
 TEST(LoadedPolicy, ActsAsTheTableInMemory) {
   const Trained run(gridExperiment({"sizes:=[4, 6]"}));
   for (const int task : {0, 1}) {

@@ -37,14 +37,23 @@ inline std::string checkpointYaml(const std::string& kind) {
            "task_encoding: one_hot}\n"
            "environment: {name: half_cheetah_dir, horizon: 15}\n";
   }
+  const std::string points =
+      "environment: {name: sparse_point_robot, train_tasks: 2, test_tasks: 1, horizon: 10}\n";
+  if (kind == "sac_model") {
+    return head + sac +
+           "task_encoding: model, exploration_episodes: [1, 2], task_model: {hidden: [6], "
+           "buffer_size: 40, exploring_interval: 2}}\n" +
+           points;
+  }
   return head + sac +
          "task_encoding: inference, context_hidden: [6], latent_size: 2, context_batch: 6, "
-         "context_buffer: 40, exploration_episodes: [1, 2]}\n"
-         "environment: {name: sparse_point_robot, train_tasks: 2, test_tasks: 1, horizon: 10}\n";
+         "context_buffer: 40, exploration_episodes: [1, 2]}\n" +
+         points;
 }
 
 inline const std::vector<std::string>& checkpointKinds() {
-  static const std::vector<std::string> kinds = {"table", "dqn", "sac_one_hot", "sac_context"};
+  static const std::vector<std::string> kinds = {"table", "dqn", "sac_one_hot", "sac_context",
+                                                 "sac_model"};
   return kinds;
 }
 

@@ -17,6 +17,11 @@ class MetaCureKind : public MetaLearnerKind {
   std::unique_ptr<PolicyFamily> policies(const Env& env, int) const override {
     return std::make_unique<MetaCurePolicies>(env.spec(), settings_);
   }
+  std::unique_ptr<Adaptation> adaptation(const PolicyFamily& policies,
+                                         const Model& policy) const override {
+    return std::make_unique<MetaCureAdaptation>(
+        dynamic_cast<const MetaCurePolicies&>(policies).networks(), policy.floats().data());
+  }
   // the prior's mean
   std::optional<std::vector<float>> metaInput(int, int) const override {
     return std::vector<float>(static_cast<std::size_t>(settings_.latent_size));

@@ -122,6 +122,12 @@ std::unique_ptr<PolicyFamily> PearlKind::policies(const Env& env, int) const {
   return std::make_unique<SacPolicies>(env.spec(), settings_.sac, 1);
 }
 
+std::unique_ptr<Adaptation> PearlKind::adaptation(const PolicyFamily& policies,
+                                                  const Model& policy) const {
+  return std::make_unique<LatentAdaptation>(dynamic_cast<const SacPolicies&>(policies).networks(),
+                                            settings_.sac.context, policy.floats().data());
+}
+
 std::optional<std::vector<float>> PearlKind::metaInput(int, int) const {
   return std::vector<float>(static_cast<std::size_t>(settings_.sac.context.latent_size));
 }

@@ -1,4 +1,5 @@
 #include "pmeta_core/baselines/rl2.h"
+#include "pmeta_core/baselines/rl2_actor.h"
 
 namespace pmeta {
 namespace {
@@ -16,6 +17,11 @@ class Rl2Kind : public MetaLearnerKind {
   }
   std::unique_ptr<PolicyFamily> policies(const Env& env, int) const override {
     return std::make_unique<Rl2Policies>(env.spec(), settings_);
+  }
+  std::unique_ptr<Adaptation> adaptation(const PolicyFamily& policies,
+                                         const Model& policy) const override {
+    return std::make_unique<Rl2Adaptation>(dynamic_cast<const Rl2Policies&>(policies).networks(),
+                                           policy.floats().data());
   }
 
  private:

@@ -74,6 +74,12 @@ const std::string& Experiment::policyFiles() const {
                           : learners().at(settings_.learner).policies;
 }
 
+std::unique_ptr<Adaptation> Experiment::adaptation(const PolicyFamily& policies,
+                                                   const Model& policy) const {
+  return hasMetaLearner() ? meta_learner_->adaptation(policies, policy)
+                          : learner_->adaptation(policies, policy);
+}
+
 std::optional<std::vector<float>> Experiment::metaInput(int task) const {
   if (hasMetaLearner()) return meta_learner_->metaInput(task, numTasks());
   return learner_->metaInput(task, numTasks());

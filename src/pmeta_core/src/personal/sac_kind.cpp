@@ -48,7 +48,7 @@ class SacKind : public LearnerKind {
     if (explores()) {
       parts.exploration_episodes = explorationEpisodes();
       parts.adapt = [&networks = learner->networks(), settings](const Model& policy) {
-        return adaptation(networks, settings, policy);
+        return makeAdaptation(networks, settings, policy);
       };
     }
     parts.learner = std::move(learner);
@@ -60,6 +60,12 @@ class SacKind : public LearnerKind {
 
   std::unique_ptr<PolicyFamily> policies(const Env& env, int num_tasks) const override {
     return std::make_unique<SacPolicies>(env.spec(), settings_, num_tasks);
+  }
+
+  std::unique_ptr<Adaptation> adaptation(const PolicyFamily& policies,
+                                         const Model& policy) const override {
+    if (!explores()) return nullptr;
+    return makeAdaptation(dynamic_cast<const SacPolicies&>(policies).networks(), settings_, policy);
   }
 
   // of z the prior's mean
@@ -74,8 +80,9 @@ class SacKind : public LearnerKind {
   // gets to know the task by exploring it
   bool explores() const { return settings_.infers() || settings_.models(); }
 
-  static std::unique_ptr<Adaptation> adaptation(const SacNetworks& networks,
-                                                const SacSettings& settings, const Model& policy) {
+  static std::unique_ptr<Adaptation> makeAdaptation(const SacNetworks& networks,
+                                                    const SacSettings& settings,
+                                                    const Model& policy) {
     const float* parameters = policy.floats().data();
     if (settings.models()) return std::make_unique<ModelAdaptation>(networks, settings, parameters);
     return std::make_unique<LatentAdaptation>(networks, settings.context, parameters);

@@ -79,7 +79,10 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file, int as_task
     throw Error("the policy file " + path + " has parameters that do not fit its own settings.");
   }
   actor_ = policies_->actor(model_, taskInput(file, path, as_task), 1);
+  told_ = as_task >= 0;
   observation_.resize(static_cast<std::size_t>(spec().observation_size));
+  next_observation_ = observation_;
+  action_.resize(static_cast<std::size_t>(spec().action_size));
 }
 
 std::vector<float> LoadedPolicy::taskInput(const PolicyFile& file, const std::string& path,
@@ -124,13 +127,57 @@ Episode LoadedPolicy::record() {
   return evaluation.record(*actor_, rng);
 }
 
-bool LoadedPolicy::act(const double* observation, double* action) {
-  for (std::size_t k = 0; k < observation_.size(); ++k) {
-    observation_[k] = static_cast<float>(observation[k]);
-    if (!std::isfinite(observation_[k])) return false;
+bool LoadedPolicy::explore(std::uint64_t seed) {
+  if (policy_ != PolicyKind::kMeta || told_) return false;
+  std::unique_ptr<Adaptation> adaptation = experiment_.adaptation(*policies_, model_);
+  if (!adaptation) return false;
+  adaptation_ = std::move(adaptation);
+  adapted_.reset();
+  exploration_episodes_ = experiment_.contextEpisodes().back();
+  episode_ = 0;
+  rng_ = Rng(seed, 0, Stream::kEvaluate);
+  return true;
+}
+
+void LoadedPolicy::beginEpisode() {
+  if (!adaptation_) return;
+  if (exploring() && episode_ > 0) adaptation_->episodeOver();
+  if (exploring() && episode_ >= exploration_episodes_) adapted_ = adaptation_->adapted(1);
+  ++episode_;
+  if (exploring()) adaptation_->beginEpisode(rng_);
+  acting().begin(0, rng_);
+}
+
+bool LoadedPolicy::observe(double reward, const double* next_observation) {
+  if (!adaptation_ || !std::isfinite(reward) || !take(next_observation, next_observation_)) {
+    return false;
   }
-  actor_->look(observation_.data(), envs_);
-  return actor_->act(0, greedy_, action);
+  Step step;
+  step.reward = reward;
+  acting().observe({0, observation_.data(), action_.data(), step, next_observation_.data()});
+  return true;
+}
+
+Actor& LoadedPolicy::acting() {
+  if (adapted_) return *adapted_;
+  return adaptation_ ? static_cast<Actor&>(*adaptation_) : *actor_;
+}
+
+bool LoadedPolicy::take(const double* numbers, std::vector<float>& observation) const {
+  for (std::size_t k = 0; k < observation.size(); ++k) {
+    observation[k] = static_cast<float>(numbers[k]);
+    if (!std::isfinite(observation[k])) return false;
+  }
+  return true;
+}
+
+bool LoadedPolicy::act(const double* observation, double* action) {
+  if (!take(observation, observation_)) return false;
+  if (adaptation_ && episode_ == 0) beginEpisode();
+  acting().look(observation_.data(), envs_);
+  if (!acting().act(0, rng_, action)) return false;
+  std::copy_n(action, action_.size(), action_.begin());
+  return true;
 }
 
 }  // namespace pmeta

@@ -1,4 +1,5 @@
 #include <csignal>
+#include <cstdint>
 #include <cstring>
 #include <iostream>
 
@@ -18,13 +19,20 @@ constexpr char kHelp[] =
 private parameters
   ~policy      policy file of a run (required)
   ~task        which task to act on; for a meta-policy that is told its task by a one-hot input
+  ~explore     false: a meta-policy that could find out its task acts as before it has (default
+               true)
+  ~seed        of the draws of its exploration (default 0)
 subscribes   observation (std_msgs/Float64MultiArray): as many numbers as the environment's have
+             reward (std_msgs/Float64): of each action, where a meta-policy finds out its task; the
+             next action waits for it
+services     begin_episode (std_srvs/Trigger): an episode is over, and the next begins; there, too
 publishes    action (std_msgs/Float64MultiArray): the greedy action, one number if it is discrete;
              /diagnostics
 An observation of a wrong size, or that is not finite, gets a warning and no action.
 )";
 
 constexpr int kMostTasks = 1000000;  // whose policy it is decides how many there are
+constexpr int kMostSeeds = 2147483647;
 
 void onSignal(int) { ros::requestShutdown(); }
 
@@ -35,7 +43,10 @@ void act() {
         "which policy? Give the private parameter policy, e.g. "
         "_policy:=RUN_FOLDER/policies/task_0.safetensors.");
   }
-  const pmeta_nodes::PolicyNode node(path, pmeta_nodes::privateIndex("task", -1, kMostTasks));
+  const pmeta_nodes::PolicyNode node(
+      path, pmeta_nodes::privateIndex("task", -1, kMostTasks),
+      pmeta_nodes::privateFlag("explore", true),
+      static_cast<std::uint64_t>(pmeta_nodes::privateIndex("seed", 0, kMostSeeds)));
   ros::spin();
 }
 

@@ -25,6 +25,13 @@ class Adaptation : public Actor {
   /// What the policy is told of the task by what is known so far: see
   /// PolicyFamily::taskInputSize(). Nothing, where it gets to know the task in another way.
   virtual std::vector<float> taskInput() const { return {}; }
+
+  /// How likely the task is each of those trained on, by what is known so far, summing up to 1;
+  /// nothing, where that is not what is known.
+  virtual std::vector<double> taskWeights() const { return {}; }
+
+  /// Do actors of adapted() need to observe what comes of their actions, too?
+  virtual bool remembers() const { return false; }
 };
 
 }  // namespace pmeta

@@ -31,9 +31,8 @@ class ModelAdaptation : public Adaptation {
   void episodeOver() override {}
   std::unique_ptr<Actor> adapted(std::size_t max_batch) const override;
   std::vector<float> taskInput() const override { return posterior_.best(); }
+  std::vector<double> taskWeights() const override { return posterior_.weights(); }
 
-  /// What is known of the task.
-  const TaskPosterior& posterior() const { return posterior_; }
   std::size_t guessed() const { return guess_; }  ///< the task that it acts as on
 
  private:

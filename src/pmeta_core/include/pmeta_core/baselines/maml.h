@@ -123,6 +123,11 @@ class MamlKind : public MetaLearnerKind {
   std::unique_ptr<PolicyFamily> policies(const Env& env, int) const override {
     return std::make_unique<GaussianMlpPolicies>(policiesOf(env.spec(), settings_.maml));
   }
+  std::unique_ptr<Adaptation> adaptation(const PolicyFamily& policies,
+                                         const Model& policy) const override {
+    return std::make_unique<GradientAdaptation>(dynamic_cast<const GaussianMlpPolicies&>(policies),
+                                                settings_.maml, policy);
+  }
 
  private:
   const char* prefix_;

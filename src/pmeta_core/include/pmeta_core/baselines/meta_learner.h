@@ -95,6 +95,15 @@ class MetaLearnerKind {
   /// Throws as make().
   virtual std::unique_ptr<PolicyFamily> policies(const Env& env, int num_tasks) const = 0;
 
+  /// How a meta-policy, which must outlive it, gets to know a task by exploring it; null where it
+  /// does not. `policies`, of this kind, must outlive it, as this must.
+  virtual std::unique_ptr<Adaptation> adaptation(const PolicyFamily& policies,
+                                                 const Model& policy) const {
+    static_cast<void>(policies);
+    static_cast<void>(policy);
+    return nullptr;
+  }
+
   /// Can the meta-policy act on tasks that were not trained on?
   virtual bool servesTestTasks() const { return true; }
 

@@ -77,6 +77,8 @@ class PearlKind : public MetaLearnerKind {
   int evaluationEpisodes() const override { return settings_.sac.evaluation_episodes; }
   std::unique_ptr<MetaLearner> make(const MetaTasks& tasks) const override;
   std::unique_ptr<PolicyFamily> policies(const Env& env, int num_tasks) const override;
+  std::unique_ptr<Adaptation> adaptation(const PolicyFamily& policies,
+                                         const Model& policy) const override;
   /// The prior's mean.
   std::optional<std::vector<float>> metaInput(int task, int num_tasks) const override;
 

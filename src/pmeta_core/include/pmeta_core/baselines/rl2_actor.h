@@ -74,6 +74,7 @@ class Rl2Adaptation : public Adaptation {
 
   void beginEpisode(Rng&) override {}
   void episodeOver() override {}
+  bool remembers() const override { return true; }
   void begin(std::size_t env, Rng& rng) override { acting_.begin(env, rng); }
   void look(const float* observations, const std::vector<std::size_t>& envs) override {
     acting_.look(observations, envs);

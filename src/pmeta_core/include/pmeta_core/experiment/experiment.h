@@ -97,6 +97,9 @@ class Experiment {
   std::unique_ptr<PolicyFamily> policies(const Env& env) const;
   /// What policy files hold: see manifest.h.
   const std::string& policyFiles() const;
+  /// How a meta-policy, which must outlive it as `policies` and this must, gets to know a task by
+  /// exploring it; null where it does not.
+  std::unique_ptr<Adaptation> adaptation(const PolicyFamily& policies, const Model& policy) const;
   /// What tells a meta-policy that has not explored to act on `task`; nothing if it must be told a
   /// training task and `task` is none.
   std::optional<std::vector<float>> metaInput(int task) const;

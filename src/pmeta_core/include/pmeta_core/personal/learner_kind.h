@@ -65,6 +65,15 @@ class LearnerKind {
   /// Throws as make().
   virtual std::unique_ptr<PolicyFamily> policies(const Env& env, int num_tasks) const = 0;
 
+  /// How a meta-policy, which must outlive it, gets to know a task by exploring it; null where it
+  /// does not. `policies`, of this kind, must outlive it, as this must.
+  virtual std::unique_ptr<Adaptation> adaptation(const PolicyFamily& policies,
+                                                 const Model& policy) const {
+    static_cast<void>(policies);
+    static_cast<void>(policy);
+    return nullptr;
+  }
+
   /// What tells a meta-policy that has not explored to act on training task `task`; nothing if it
   /// must be told one of `num_tasks` and `task` is none.
   virtual std::optional<std::vector<float>> metaInput(int task, int num_tasks) const = 0;
