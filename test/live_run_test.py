@@ -5,7 +5,7 @@ import re
 import signal
 
 from faults_test import process, rounds_written, wait_until
-from programs import TOP, environment, run
+from programs import LOCAL, TOP, environment, run
 
 
 def launch(tmp_path, run_id, *arguments):
@@ -130,3 +130,24 @@ print(sorted(collections.Counter((m.policy_name, m.round) for _, m, _ in
             (tmp_path / "replay.log").read_text()
         replayed.terminate()  # killed, it would leave its nodes behind
         replayed.wait(60)
+
+
+def test_a_finished_run_is_shown_without_training(tmp_path):
+    env = environment(tmp_path)
+    folder = tmp_path / "gridworld/shown"
+    done = run([LOCAL, "run", "config/gridworld.yaml", "rounds:=3", "run_id:=shown",
+                "results_dir:=%s" % tmp_path], env=env)
+    assert done.returncode == 0, done.stderr
+    before = sorted((path, path.stat().st_mtime) for path in folder.rglob("*"))
+    with process(["roslaunch", "pmeta_nodes", "show.launch", "run:=%s" % folder, "rviz:=false"],
+                 tmp_path / "show.log", env) as showing:
+        def shows_all():
+            markers = run(["timeout", "20", "rostopic", "echo", "-n1", "/pmeta/markers"],
+                          env=env).stdout
+            return ("gridworld: round 3 of 3 (finished)" in markers
+                    and re.search(r"(?s)personal return -?\d.*meta return -?\d", markers))
+
+        assert wait_until(shows_all), (tmp_path / "show.log").read_text()
+        showing.terminate()  # killed, it would leave its nodes behind
+        showing.wait(60)
+    assert sorted((path, path.stat().st_mtime) for path in folder.rglob("*")) == before

@@ -139,7 +139,16 @@ TEST(Cards, SayReturnsAndTheRoundWhereItIsNotTheTitles) {
   summary.round = 7;
   content.summary = boost::make_shared<pmeta_msgs::RoundSummary>(summary);
   EXPECT_EQ("meta return 0.00", find(draw(), "results", 3).text);
-  content.has_meta = false;
+  pmeta_msgs::Trajectory explored;
+  explored.task_weights = {0.034, 0.966};
+  content.tasks[1].meta.episode = boost::make_shared<pmeta_msgs::Trajectory>(explored);
+  EXPECT_EQ("meta return 0.00, takes it for task 1 (97 %)", find(draw(), "results", 3).text);
+  explored.task_weights = {1};  // of another set of tasks
+  content.tasks[1].meta.episode = boost::make_shared<pmeta_msgs::Trajectory>(explored);
+  EXPECT_EQ("meta return 0.00", find(draw(), "results", 3).text);
+  content.tasks[1].meta.episode.reset();
+  content.has_personal = content.has_meta = false;
+  EXPECT_EQ("personal: no personal policy here", find(draw(), "results", 2).text);
   content.tasks[1].meta.result.reset();
   EXPECT_EQ("meta: no meta-policy here", find(draw(), "results", 3).text);
   EXPECT_EQ("half_cheetah_vel_0", find(draw(), "names", 0).text);

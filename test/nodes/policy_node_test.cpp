@@ -1,6 +1,8 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <spawn.h>
+#include <std_msgs/Float64.h>
 #include <std_msgs/Float64MultiArray.h>
+#include <std_srvs/Trigger.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -9,6 +11,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/storage/policy_file.h"
 #include "run_over_ros.h"
 
@@ -139,6 +142,92 @@ TEST_F(PolicyNodeTest, ARunsPersonalPolicyAnswersObservationsWithItsGreedyAction
   int status = -1;
   waitpid(pid, &status, 0);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+}
+
+// a run of the point robot in this process, whose meta-policy finds out its task
+std::string exploringPolicy(const std::string& folder) {
+  const pmeta::Experiment experiment = pmeta::Experiment::parse(
+      "experiment: point\nrun_id: run\nrounds: 2\nupdates_per_round: 20\nlearner: sac\n"
+      "personal: {alpha: 0.001, lambda: 15, eta: 0.01}\n"
+      "sac: {hidden: [12, 10], batch_size: 16, buffer_size: 500, warm_up_steps: 40, "
+      "task_encoding: model, evaluation_episodes: 2}\n"
+      "environment: {name: sparse_point_robot}\n",
+      "point.yaml", {"results_dir:=" + folder});
+  pmeta::RunLog log(experiment);
+  pmeta::runLocally(experiment, &log);
+  return log.dir() + "/policies/meta.safetensors";
+}
+
+TEST_F(PolicyNodeTest, AMetaPolicyFindsOutItsTaskBeforeItActs) {
+  char folder[] = "/tmp/pmeta_policy_XXXXXX";
+  ASSERT_NE(mkdtemp(folder), nullptr);
+  const std::string path = exploringPolicy(folder);
+  pmeta::LoadedPolicy expected(path);
+  ASSERT_TRUE(expected.explore(5));
+
+  ros::NodeHandle there("explorer");
+  const ros::Publisher observations = there.advertise<Float64MultiArray>("observation", 1);
+  const ros::Publisher rewards = there.advertise<std_msgs::Float64>("reward", 1);
+  std::optional<std::vector<double>> action;
+  const ros::Subscriber actions = there.subscribe<Float64MultiArray>(
+      "action", 1, [&](const Float64MultiArray::ConstPtr& msg) { action = msg->data; });
+  const std::string policy = "_policy:=" + path;
+  const int pid =
+      start({"policy_node", policy.c_str(), "_seed:=5", "__ns:=explorer", "__name:=explorer"});
+  ASSERT_TRUE(waitFor(
+      [&] {
+        return observations.getNumSubscribers() > 0 && rewards.getNumSubscribers() > 0 &&
+               actions.getNumPublishers() > 0 &&
+               ros::service::exists("explorer/begin_episode", false);
+      },
+      20));
+  const auto send = [&](double x) {
+    Float64MultiArray msg;
+    msg.data = {x, 0.2};
+    observations.publish(msg);
+  };
+  const auto sendReward = [&](double value) {
+    std_msgs::Float64 msg;
+    msg.data = value;
+    rewards.publish(msg);
+  };
+
+  for (int episode = 1; episode <= 3; ++episode) {
+    std_srvs::Trigger begin;
+    ASSERT_TRUE(ros::service::call("explorer/begin_episode", begin));
+    EXPECT_EQ(begin.response.message,
+              episode == 3 ? "acting" : "exploring, episode " + std::to_string(episode) + " of 2");
+    expected.beginEpisode();
+    double x = 0.1 * episode;
+    send(x);
+    for (int t = 0; t < 6; ++t) {
+      std::vector<double> answer(2);
+      const double here[] = {x, 0.2};
+      ASSERT_TRUE(expected.act(here, answer.data()));
+      ASSERT_TRUE(waitFor([&] { return action.has_value(); }, 5)) << episode << ", " << t;
+      EXPECT_EQ(*action, answer) << "episode " << episode << ", step " << t;
+      action.reset();
+      x += 0.1 * answer[0];
+      const double next[] = {x, 0.2};
+      expected.observe(t % 2, next);
+      // in either order; a policy that knows its task needs no reward
+      if (t % 2 == 0) send(x);
+      if (episode < 3) {
+        if (t % 2 == 0) {
+          EXPECT_FALSE(waitFor([&] { return action.has_value(); }, 0.05)) << "half of it is known";
+        }
+        sendReward(t % 2);
+      }
+      if (t % 2 == 1) send(x);
+    }
+    ASSERT_TRUE(waitFor([&] { return action.has_value(); }, 5));
+    action.reset();
+  }
+  kill(pid, SIGINT);
+  int status = -1;
+  waitpid(pid, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  std::filesystem::remove_all(folder);
 }
 
 TEST_F(PolicyNodeTest, SaysInOneSentenceWhatIsWrong) {

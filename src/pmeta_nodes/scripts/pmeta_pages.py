@@ -11,6 +11,7 @@ import re
 import pmeta_archives as pa
 import pmeta_comparisons as pc
 import pmeta_groups as pg
+import pmeta_inference as pi
 import pmeta_margins as pm
 import pmeta_runs as pr
 import pmeta_statistics as ps
@@ -132,6 +133,14 @@ def of_sweeps(make):
 def comparisons_of(rows, groups):
     heads, lines = pc.comparison_cells(groups)
     return markdown(heads, lines, 3) if lines else ""
+
+
+def inference_of(_, groups):
+    reached = pi.reached_cells(groups)
+    parts = [markdown(*pi.inference_cells(groups))]
+    if reached[1]:
+        parts += ["Tasks whose last return is at least %d:" % pi.REACHED, markdown(*reached)]
+    return "\n\n".join(parts)
 
 
 def wins_block(data, *names):
@@ -268,6 +277,6 @@ KINDS = {
     "learning": of_sweeps(lambda rows, groups: markdown(*pt.learning_cells(rows))),
     "returns": of_sweeps(lambda rows, groups: markdown(*pt.best_cells(rows), words=2)),
     "iqm": of_sweeps(lambda rows, groups: markdown(*pc.iqm_cells(rows), words=2)),
-    "comparisons": of_sweeps(comparisons_of), "wins": wins_block,
+    "inference": of_sweeps(inference_of), "comparisons": of_sweeps(comparisons_of), "wins": wins_block,
     "margins": margins_block,
 }

@@ -9,7 +9,7 @@ namespace {
 AdaptedReturn evaluateKnown(Evaluation& evaluation, const Adaptation& adaptation, int episodes,
                             Rng& rng) {
   const auto actor = adaptation.adapted(static_cast<std::size_t>(evaluation.episodes()));
-  return {episodes, evaluation.run(*actor, rng), adaptation.taskInput()};
+  return {episodes, evaluation.run(*actor, rng), adaptation.taskInput(), adaptation.taskWeights()};
 }
 
 }  // namespace

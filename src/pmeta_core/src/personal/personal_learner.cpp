@@ -103,16 +103,12 @@ UpdateStats PersonalLearner::update(Rng& rng) {
   return stats;
 }
 
-ReturnStats PersonalLearner::run(const Model& policy, const std::vector<float>& task_input,
-                                 Rng& rng) const {
+ReturnStats PersonalLearner::evaluate(const Model& policy, const std::vector<float>& task_input,
+                                      Rng& rng) const {
+  if (const std::optional<ReturnStats> exact = parts_.learner->exactReturn(policy)) return *exact;
   const std::unique_ptr<Actor> actor =
       parts_.learner->policies().actor(policy, task_input, evaluation_->episodes());
   return evaluation_->run(*actor, rng);
-}
-
-ReturnStats PersonalLearner::evaluate(const Model& policy, Rng& rng) const {
-  const std::optional<ReturnStats> exact = parts_.learner->exactReturn(policy);
-  return exact ? *exact : run(policy, taskInput(policy), rng);
 }
 
 std::vector<AdaptedReturn> PersonalLearner::evaluateAdapted(const Model& policy, Rng& rng) const {

@@ -78,14 +78,15 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file, int as_task
   if (model_.layout != policies_->layout()) {
     throw Error("the policy file " + path + " has parameters that do not fit its own settings.");
   }
-  actor_ = policies_->actor(model_, taskInput(file, path, as_task), 1);
+  task_input_ = readTaskInput(file, path, as_task);
+  actor_ = policies_->actor(model_, task_input_, 1);
   told_ = as_task >= 0;
   observation_.resize(static_cast<std::size_t>(spec().observation_size));
   next_observation_ = observation_;
   action_.resize(static_cast<std::size_t>(spec().action_size));
 }
 
-std::vector<float> LoadedPolicy::taskInput(const PolicyFile& file, const std::string& path,
+std::vector<float> LoadedPolicy::readTaskInput(const PolicyFile& file, const std::string& path,
                                            int as_task) const {
   if (policy_ == PolicyKind::kMeta) {
     const auto input = experiment_.metaInput(as_task);

@@ -206,8 +206,11 @@ Episode MetaTrainer::recordMeta(const MetaPolicy& meta, int task) const {
   if (!evaluated_ || meta.round != evaluated_->round) refuseUnevaluated(meta);
   const auto k = static_cast<std::size_t>(task);
   Rng rng = evaluationRng(task);
-  const std::unique_ptr<Actor> actor = evaluated_->adaptations.at(k)->adapted(1);
-  return evaluation_[k]->record(*actor, rng);
+  const Adaptation& adaptation = *evaluated_->adaptations.at(k);
+  const std::unique_ptr<Actor> actor = adaptation.adapted(1);
+  Episode episode = evaluation_[k]->record(*actor, rng);
+  episode.task_weights = adaptation.taskWeights();
+  return episode;
 }
 
 ReturnStats MetaTrainer::evaluateFresh(const Model& policy, int task, int episodes) const {

@@ -11,9 +11,15 @@ PolicyEvaluation::PolicyEvaluation(const LoadedPolicy& policy) : policy_(policy)
 
 ReturnStats PolicyEvaluation::on(int task, int episodes) const {
   if (trainer_) return trainer_->evaluateFresh(policy_.model(), task, episodes);
-  const bool explores = policy_.experiment().contextEpisodes().size() > 1;
-  return TaskAgent(policy_.experiment(), task)
-      .evaluateFresh(explores ? PolicyKind::kMeta : policy_.policy(), policy_.model(), episodes);
+  const Experiment& experiment = policy_.experiment();
+  if (policy_.policy() == PolicyKind::kMeta) {
+    return TaskAgent(experiment, task).evaluateFresh(PolicyKind::kMeta, policy_.model(), episodes);
+  }
+  const std::unique_ptr<PersonalLearner> learner = experiment.makeLearner(task);
+  return overFreshEpisodes(static_cast<std::uint64_t>(experiment.settings().seed), task, episodes,
+                           [&](Rng& rng) {
+                             return learner->evaluate(policy_.model(), policy_.taskInput(), rng);
+                           });
 }
 
 }  // namespace pmeta

@@ -1,13 +1,9 @@
 #include "pmeta_core/run/trace.h"
 
-#include <filesystem>
-#include <memory>
 #include <vector>
 
 #include "pmeta_core/base/settings.h"
-#include "pmeta_core/run/loaded_policy.h"
-#include "pmeta_core/run/meta_trainer.h"
-#include "pmeta_core/run/task_agent.h"
+#include "pmeta_core/run/finished_run.h"
 #include "pmeta_core/storage/run_lock.h"
 #include "pmeta_core/storage/run_log.h"
 
@@ -29,8 +25,6 @@ class Table {
     }
   }
 
-  bool empty() const { return rows_.empty(); }
-
   std::string text() const {
     std::string header = "policy,split,task,context_episodes,step";
     for (std::size_t k = 0; k < size_; ++k) header += ",observation_" + std::to_string(k);
@@ -42,55 +36,28 @@ class Table {
   std::string rows_;
 };
 
-// after the last number of exploration episodes that `experiment` has
-void addMeta(const Experiment& experiment, const Model& model, Table& table) {
-  MetaPolicy meta;
-  meta.model = model;
-  meta.evaluate = true;
-  const auto add = [&](Party& party) {
-    party.evaluateMeta(meta);
-    for (const int task : party.tasks()) {
-      table.add(PolicyKind::kMeta, experiment.isTestTask(task) ? Split::kTest : Split::kTrain, task,
-                experiment.contextEpisodes().back(), party.recordMeta(meta, task));
-    }
-  };
-  if (experiment.hasMetaLearner()) {
-    MetaTrainer trainer(experiment);
-    return add(trainer);
-  }
-  for (int task = 0; task < experiment.totalTasks(); ++task) {
-    TaskAgent agent(experiment, task);
-    add(agent);
-  }
-}
-
 }  // namespace
 
 void writeTrajectories(const std::string& run_dir) {
-  const std::string config = run_dir + "/config.yaml";
-  const Experiment experiment = Experiment::load(config);
+  const FinishedRun run(run_dir);
+  const Experiment& experiment = run.experiment();
   const RunLock lock(run_dir);
   Table table;
+  const auto add = [&](const ShownPolicy& shown) {
+    table.add(shown.result.policy, shown.result.split, shown.result.task,
+              shown.result.context_episodes, shown.episode);
+  };
   for (int task = 0; task < experiment.numTasks(); ++task) {
-    const std::string path = run_dir + "/policies/task_" + std::to_string(task) + ".safetensors";
-    if (!std::filesystem::exists(path)) continue;
-    table.add(PolicyKind::kPersonal, Split::kTrain, task, 0, LoadedPolicy(path).record());
+    if (const auto personal = run.personal(task)) add(*personal);
   }
-  const std::string path = run_dir + "/policies/meta.safetensors";
-  if (std::filesystem::exists(path)) {
-    // a meta-policy that is told its task is told it by each agent: 0 stands for any
-    const LoadedPolicy meta(path, 0);
-    for (const int count : experiment.contextEpisodes()) {
-      if (count > 0) {
-        addMeta(Experiment::load(config, {"exploration_episodes:=[" + std::to_string(count) + "]"}),
-                meta.model(), table);
-      } else if (experiment.contextEpisodes().size() == 1) {
-        addMeta(experiment, meta.model(), table);
-      }
-    }
+  const std::vector<int> counts = experiment.contextEpisodes();
+  if (counts.size() == 1) {
+    for (const ShownPolicy& meta : run.meta()) add(meta);
   }
-  if (table.empty()) {
-    throw Error(run_dir + " has no policies below policies/: only a run that is over keeps them.");
+  for (std::size_t i = 1; i < counts.size(); ++i) {
+    const FinishedRun after(run_dir,
+                            {"exploration_episodes:=[" + std::to_string(counts[i]) + "]"});
+    for (const ShownPolicy& meta : after.meta()) add(meta);
   }
   writeFileAtomically(run_dir + "/trajectories.csv", table.text());
 }

@@ -240,6 +240,7 @@ pmeta_msgs::Trajectory toMsg(const pmeta::Episode& episode, const pmeta::Experim
   msg.episode_return = std::accumulate(episode.rewards.begin(), episode.rewards.end(), 0.0);
   msg.state_values = episode.state_values;
   msg.greedy_actions = episode.greedy_actions;
+  msg.task_weights = episode.task_weights;
   msg.action_grid = static_cast<std::uint32_t>(episode.action_grid);
   msg.action_values = episode.action_values;
   return msg;

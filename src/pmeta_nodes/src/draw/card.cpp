@@ -1,6 +1,7 @@
 #include "draw/card.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 
@@ -70,6 +71,17 @@ std::string shortDescription(const std::string& description, double letter, doub
   return fits || colon == std::string::npos ? text : text.substr(colon + 2);
 }
 
+/// Which task a policy that explored takes it for, and how surely; "" where it does not say.
+std::string guessText(const Cards& cards, const PolicyView& view, bool brief) {
+  if (!view.episode || cards.num_train < 2) return "";
+  const std::vector<double>& weights = view.episode->task_weights;
+  if (weights.size() != static_cast<std::size_t>(cards.num_train)) return "";
+  const auto likeliest = std::max_element(weights.begin(), weights.end());
+  const std::string task = "task " + std::to_string(likeliest - weights.begin());
+  if (brief) return ", as " + task;
+  return ", takes it for " + task + " (" + std::to_string(std::lround(100 * *likeliest)) + " %)";
+}
+
 /// The round is named only where it is not the one that the title names; `brief` text has only the
 /// policy and its return.
 std::string labelText(const Cards& cards, const SceneContent& content, int task, int policy,
@@ -79,7 +91,8 @@ std::string labelText(const Cards& cards, const SceneContent& content, int task,
   const PolicyView& view = viewOf(content, task, policy);
   const std::string name = is_meta ? "meta" : "personal";
   if (view.result && content.summary && view.result->round == content.summary->round) {
-    return name + (brief ? " " : " return ") + number(view.result->return_mean);
+    return name + (brief ? " " : " return ") + number(view.result->return_mean) +
+           guessText(cards, view, brief);
   }
   return name + ": " + resultText(view, content, is_meta);
 }

@@ -46,6 +46,7 @@ const PolicyView& viewOf(const SceneContent& content, int task, int policy) {
 
 std::string resultText(const PolicyView& view, const SceneContent& content, bool is_meta) {
   if (is_meta && !content.has_meta) return "no meta-policy here";
+  if (!is_meta && !content.has_personal) return "no personal policy here";
   if (view.result) {
     return "round " + std::to_string(view.result->round) + ", return " +
            number(view.result->return_mean);

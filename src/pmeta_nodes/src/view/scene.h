@@ -33,6 +33,7 @@ struct SceneContent {
   std::string experiment;        ///< its name, for the title
   int rounds = 0;                ///< C
   bool has_trajectories = true;  ///< false: agents send none, and the title says so
+  bool has_personal = true;      ///< false: one learner of all tasks, and the scene says so
   bool has_meta = true;          ///< false: independent training, and the scene says so
   std::vector<TaskView> tasks;   ///< one for each task, test tasks last
   pmeta_msgs::RoundSummary::ConstPtr summary;  ///< null: no round yet

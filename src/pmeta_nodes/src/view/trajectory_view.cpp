@@ -25,6 +25,7 @@ TrajectoryView::TrajectoryView(ros::NodeHandle nh, const pmeta::Experiment& expe
   content_.experiment = settings.experiment;
   content_.rounds = settings.rounds;
   content_.has_trajectories = settings.publish_trajectories;
+  content_.has_personal = !experiment.hasMetaLearner();
   content_.has_meta = experiment.evaluatesMeta();
   content_.tasks.resize(num_tasks);
   playbacks_.assign(num_tasks, Playback(scene_->stepSeconds()));

@@ -23,8 +23,11 @@ struct Episode {
   std::vector<double> rewards;       ///< steps
   int position_size = 0;             ///< numbers of one configuration; 0: there are none
   std::vector<double> positions;     ///< (steps + 1) x position_size, see Env::configuration()
-  bool terminated = false;           ///< it ended in a terminal state
-  bool truncated = false;  ///< it ended at the horizon, or where its simulation broke down
+  /// How likely the policy took the task to be each of those trained on; see
+  /// Adaptation::taskWeights().
+  std::vector<double> task_weights;
+  bool terminated = false;  ///< it ended in a terminal state
+  bool truncated = false;   ///< it ended at the horizon, or where its simulation broke down
   std::vector<double> state_values;  ///< tabular tasks: max_a Q(s,a) by state, NaN where not owned
   std::vector<std::int32_t> greedy_actions;  ///< tabular tasks: argmax_a Q(s,a), -1 where not owned
   int action_grid = 0;  ///< actions along each axis of `action_values`; 0: there are none

@@ -59,7 +59,11 @@ class PersonalLearner {
 
   /// Return of `policy` on this task, greedy: exact where the learner knows the task's model, else
   /// the mean over one episode in each evaluation environment, whose starts depend on `rng` only.
-  ReturnStats evaluate(const Model& policy, Rng& rng) const;
+  ReturnStats evaluate(const Model& policy, Rng& rng) const {
+    return evaluate(policy, taskInput(policy), rng);
+  }
+  /// The same of a policy that is told `task_input`.
+  ReturnStats evaluate(const Model& policy, const std::vector<float>& task_input, Rng& rng) const;
 
   /// What tells `policy` the task beside the observations, as far as this learner knows; empty if
   /// nothing does.
@@ -78,7 +82,9 @@ class PersonalLearner {
   /// The same of a policy that knows what it knew in `adapted`, which evaluateAdapted() gave: with
   /// its `rng`, the first of the episodes behind that return.
   Episode recordAdapted(const Model& policy, const AdaptedReturn& adapted, Rng& rng) const {
-    return recordWith(policy, adapted.task_input, rng);
+    Episode episode = recordWith(policy, adapted.task_input, rng);
+    episode.task_weights = adapted.task_weights;
+    return episode;
   }
 
   /// What PersonalParts gave, for tests and measurements.
@@ -95,7 +101,6 @@ class PersonalLearner {
   using Pull = std::variant<ProximalSgd<double>, ProximalAdam>;
 
   static Pull makePull(Model& personal, Model& auxiliary, const PersonalSettings& settings);
-  ReturnStats run(const Model& policy, const std::vector<float>& task_input, Rng& rng) const;
   Episode recordWith(const Model& policy, const std::vector<float>& task_input, Rng& rng) const;
 
   PersonalParts parts_;

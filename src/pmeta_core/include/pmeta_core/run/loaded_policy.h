@@ -31,6 +31,8 @@ class LoadedPolicy {
   /// Of its task, or of task 0 for a meta-policy.
   const EnvSpec& spec() const { return env_->spec(); }
   const Model& model() const { return model_; }  ///< parameters as in the file
+  /// What it is told of its task, unless it explores: see PolicyFamily::taskInputSize().
+  const std::vector<float>& taskInput() const { return task_input_; }
   PolicyKind policy() const { return policy_; }  ///< which of the two it is
   int task() const { return task_; }    ///< whose personal policy it is; -1 for a meta-policy
   int round() const { return round_; }  ///< rounds of training behind it
@@ -74,11 +76,12 @@ class LoadedPolicy {
   LoadedPolicy(const std::string& path, PolicyFile file, int as_task);
   bool take(const double* numbers, std::vector<float>& observation) const;
   Actor& acting();
-  std::vector<float> taskInput(const PolicyFile& file, const std::string& path, int as_task) const;
+  std::vector<float> readTaskInput(const PolicyFile& file, const std::string& path, int as_task) const;
 
   Experiment experiment_;
   bool told_ = false;  ///< which task to act on
   Model model_;
+  std::vector<float> task_input_;
   PolicyKind policy_ = PolicyKind::kMeta;
   int task_ = -1;
   int round_ = 0;

@@ -13,8 +13,8 @@ class PolicyEvaluation {
   /// `policy` must outlive it. Throws as the experiment's learners do.
   explicit PolicyEvaluation(const LoadedPolicy& policy);
 
-  /// On at least `episodes` episodes that no round evaluates. What a personal policy knew of its
-  /// task went with its agent: where policies explore, it explores anew, as a meta-policy does.
+  /// On at least `episodes` episodes that no round evaluates: a personal policy with what its file
+  /// knows of its task, the meta-policy after exploration.
   ReturnStats on(int task, int episodes) const;
 
  private:

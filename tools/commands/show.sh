@@ -1,0 +1,35 @@
+# Learn: rviz with trained policies, without training
+#
+# usage: ./pmeta show EXPERIMENT|RUN [speed:=N] [rviz_config:=FILE]
+#
+# EXPERIMENT is a set whose trained policies are shipped (config/policies), RUN the folder of a run
+# that is over. Both policies of each task are evaluated, which takes seconds, and played until
+# Ctrl-C; speed:=2 plays them twice as fast.
+#
+# Examples:
+#   ./pmeta show half_cheetah_dir
+#   ./pmeta show ~/.ros/pmeta/cart_pole/RUN
+
+. "$TOP/tools/launch.sh"
+
+# the folder with the policies that a word means
+policies_of() {
+  local shipped=$TOP/config/policies
+  if [ -d "$1" ]; then
+    realpath "$1"
+  elif [ -d "$shipped/$1" ]; then
+    echo "$shipped/$1"
+  else
+    die "'$1' is neither the folder of a run nor a set with shipped policies, which are: $(find "$shipped" -mindepth 1 -maxdepth 1 -type d -printf '%f\n' | sort | xargs)."
+  fi
+}
+
+command_main() {
+  [ $# -ge 1 ] || die "which policies? See ./pmeta show --help."
+  local folder
+  folder=$(policies_of "$1")
+  shift
+  require_assignments "$@"
+  ensure_built
+  roslaunch --skip-log-check pmeta_nodes show.launch "run:=$folder" "$@"
+}
