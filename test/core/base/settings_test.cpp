@@ -268,6 +268,21 @@ TEST(Settings, AssignOverridesByFullOrShortKey) {
   EXPECT_EQ(s.title, "a:=b");
 }
 
+TEST(Settings, AGroupWithinAGroupTakesNoShortNameFromIt) {
+  Settings settings;
+  int inner = 1, outer = 2, only = 3;
+  settings.bind("net.part.size", inner, "units", Range::atLeast(1));
+  settings.bind("net.size", outer, "units", Range::atLeast(1));
+  settings.bind("net.part.depth", only, "layers", Range::atLeast(1));
+  settings.assign("size:=5");
+  EXPECT_EQ(outer, 5);
+  EXPECT_EQ(inner, 1);
+  settings.assign("net.part.size:=6");
+  EXPECT_EQ(inner, 6);
+  settings.assign("depth:=7");
+  EXPECT_EQ(only, 7);
+}
+
 TEST(Settings, AssignTakesTextAsItStands) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"", ""},         {"\"\"", ""},     {"''", ""},           {"~", "~"},

@@ -91,8 +91,15 @@ void Settings::assign(const std::string& assignment) {
 std::string Settings::resolve(const std::string& name, const std::string& source) const {
   if (find(name) != nullptr) return name;
   std::vector<std::string> matches;
+  const auto depth = [](const std::string& key) { return std::count(key.begin(), key.end(), '.'); };
   for (const Entry& entry : entries_) {
-    if (lastPart(entry.key) == name) matches.push_back(entry.key);
+    if (lastPart(entry.key) != name) continue;
+    // a group within a group takes no name from the one around it
+    if (!matches.empty() && depth(entry.key) != depth(matches.front())) {
+      if (depth(entry.key) > depth(matches.front())) continue;
+      matches.clear();
+    }
+    matches.push_back(entry.key);
   }
   if (matches.empty()) refuseUnknown(name, source);
   if (matches.size() > 1) {

@@ -77,7 +77,8 @@ class Settings {
   /// Reads a map of (nested) settings; `source` names it in errors.
   void read(const YAML::Node& root, const std::string& source);
 
-  /// Applies "key:=value"; the key may be shortened to its last part where that is unambiguous.
+  /// Applies "key:=value"; the key may be shortened to its last part where that is unambiguous: of
+  /// several keys that end so the one with the fewest parts.
   /// The value is YAML, e.g. "lambda:=5" or "sizes:=[4,5]".
   void assign(const std::string& assignment);
 
