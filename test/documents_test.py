@@ -25,7 +25,8 @@ LONG = (r"\./pmeta (test|fuzz|chaos|bench|build|setup|results|coverage|lint)\b",
         r"\./pmeta run .*netns")
 
 # ends when somebody ends it
-ENDLESS = (r"policy_node", r"agent\.launch", r"replay_bag\.launch", r"rviz:=true", r"hold:=true")
+ENDLESS = (r"policy_node", r"agent\.launch", r"replay_bag\.launch", r"\./pmeta show", r"show\.launch",
+           r"rviz:=true", r"hold:=true")
 
 # asks a run that goes on
 LIVE = r"(rostopic|rosservice|rosparam|rosmsg)\b"
