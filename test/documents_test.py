@@ -74,7 +74,7 @@ class Desk:
         self.folder = folder
         self.env = dict(environment(folder), HOME=str(folder), PWD=str(folder))
         del self.env["ROS_HOME"]  # so that ~/.ros is what it is to the reader
-        for name in ("pmeta", "devel", "config", "test", "src"):
+        for name in ("pmeta", "devel", "config", "examples", "test", "src"):
             (folder / name).symlink_to(TOP / name)
         for page in PAGES:
             for language, lines in fenced_blocks(page.read_text()):
@@ -193,7 +193,7 @@ def flags_are_known(command):
             assert word.split("=")[0].rstrip("_") in told.stdout, "%s is not in the help" % word
 
 
-def sweep_is_sound(command):
+def sweep_is_sound(command, folder):
     """Settings and values of a sweep that takes hours are checked, by the first of each list."""
     words = shlex.split(re.sub(r'^\w+="([^"]*)"; (.*)\$\w+(.*)$', r"\2\1\3", command))
     options = [i for i, word in enumerate(words) if word in ("--name", "--jobs")]
@@ -207,7 +207,9 @@ def sweep_is_sound(command):
         elif "],[" in value:
             value = value.split("],")[0] + "]"
         first.append(key + ":=" + value)
-    checked = run([LOCAL, "check", TOP / ("config/%s.yaml" % words[2])] + first)
+    own = words[2].endswith(".yaml")
+    config = folder / words[2] if own else TOP / ("config/%s.yaml" % words[2])
+    checked = run([LOCAL, "check", config] + first)
     assert checked.returncode == 0, checked.stderr
 
 
@@ -216,7 +218,7 @@ def test_a_command_of_the_pages_does_what_it_says(command, desk, request):
     if matches(LONG, command):
         flags_are_known(command)
         if "./pmeta sweep" in command:
-            sweep_is_sound(command)
+            sweep_is_sound(command, desk.folder)
         if not request.config.getoption("--long") or "docs/results" in request.node.name:
             return
         return desk.type(desk.filled_in(command), 3600)

@@ -1,4 +1,5 @@
-// Steps of the MuJoCo environments beside a bare loop of mj_step on the same model.
+// Steps of the MuJoCo environments beside a bare loop of mj_step on the same model, and of one that
+// is written in YAML beside the built-in one.
 #include <mujoco/mujoco.h>
 
 #include <memory>
@@ -8,6 +9,7 @@
 #include "pmeta_core/env/ant.h"
 #include "pmeta_core/env/half_cheetah.h"
 #include "pmeta_core/env/walker2d.h"
+#include "pmeta_core/experiment/experiment.h"
 
 namespace bench {
 namespace {
@@ -42,15 +44,33 @@ class BareLoop {
   int frame_skip_;
 };
 
+// another environment of the half-cheetah, from the same state
+class BuiltIn {
+ public:
+  void start(const std::vector<double>& state) {
+    std::vector<double> own(state.begin(), state.begin() + 27);  // qpos, qvel, warm start
+    own.insert(own.end(), {state[0], 0, state[1], 0});  // about where the torso is; no steps
+    env_.setState(own);
+  }
+  void step(const double* action) {
+    benchmark::DoNotOptimize(env_.step(action, rng_, observation_));
+  }
+
+ private:
+  pmeta::HalfCheetah env_{{}, pmeta::MujocoModel::open("", pmeta::HalfCheetah::layout())};
+  pmeta::Rng rng_{0, 0, pmeta::Stream::kMeasure};
+  double observation_[20] = {};
+};
+
 // both take the same steps, batch by batch in turns
-void stepBeside(benchmark::State& state, int row, const char* name, pmeta::MujocoEnv& env,
-                int frame_skip) {
+template <class Other>
+void stepBeside(benchmark::State& state, int row, const char* name, pmeta::Env& env, Other& other,
+                const char* limit) {
   const std::size_t action_size = env.spec().action_size;
   pmeta::Rng rng(0, 0, pmeta::Stream::kMeasure);
   std::vector<double> actions(action_size * kSteps);
   std::vector<double> observation(env.spec().observation_size);
-  BareLoop bare(env, frame_skip);
-  std::vector<double> env_times, bare_times;
+  std::vector<double> env_times, other_times;
   const auto timeEnv = [&] {
     const double* action = actions.data();
     env_times.push_back(meanSeconds(kSteps, [&] {
@@ -58,10 +78,10 @@ void stepBeside(benchmark::State& state, int row, const char* name, pmeta::Mujoc
       action += action_size;
     }));
   };
-  const auto timeBare = [&] {
+  const auto timeOther = [&] {
     const double* action = actions.data();
-    bare_times.push_back(meanSeconds(kSteps, [&] {
-      bare.step(action);
+    other_times.push_back(meanSeconds(kSteps, [&] {
+      other.step(action);
       action += action_size;
     }));
   };
@@ -69,16 +89,22 @@ void stepBeside(benchmark::State& state, int row, const char* name, pmeta::Mujoc
     env.reset(rng, observation.data());
     for (int batch = 0; batch < kBatchesInEpisode; ++batch) {
       for (double& action : actions) action = 2 * rng.uniform() - 1;
-      bare.start(env.state());
+      other.start(env.state());
       // who comes second finds the caches warm
       if (batch % 2 == 0) timeEnv();
-      timeBare();
+      timeOther();
       if (batch % 2 == 1) timeEnv();
     }
   }
   state.SetItemsProcessed(state.iterations() * kBatchesInEpisode * kSteps);
-  report({Part::kLoops, row}, name, Unit::kSeconds, undisturbed(env_times), undisturbed(bare_times),
-         "a bare loop of mj_step");
+  report({Part::kLoops, row}, name, Unit::kSeconds, undisturbed(env_times),
+         undisturbed(other_times), limit);
+}
+
+void stepBeside(benchmark::State& state, int row, const char* name, pmeta::MujocoEnv& env,
+                int frame_skip) {
+  BareLoop bare(env, frame_skip);
+  stepBeside(state, row, name, env, bare, "a bare loop of mj_step");
 }
 
 void HalfCheetahStep(benchmark::State& state) {
@@ -86,6 +112,14 @@ void HalfCheetahStep(benchmark::State& state) {
   stepBeside(state, 23, "half-cheetah step", env, 5);
 }
 BENCHMARK(HalfCheetahStep)->Unit(benchmark::kMicrosecond);
+
+void HalfCheetahInYamlStep(benchmark::State& state) {
+  const auto yaml = pmeta::Experiment::load(PMETA_TEST_DATA "/mjcf/half_cheetah_dir.yaml");
+  const auto env = yaml.family().make(1);
+  BuiltIn built_in;
+  stepBeside(state, 27, "half-cheetah step, in YAML", *env, built_in, "the built-in one");
+}
+BENCHMARK(HalfCheetahInYamlStep)->Unit(benchmark::kMicrosecond);
 
 void AntStep(benchmark::State& state) {
   pmeta::Ant env(0, pmeta::MujocoModel::open("", pmeta::Ant::layout()));

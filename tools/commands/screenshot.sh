@@ -33,8 +33,9 @@ end_screenshot() {
 
 command_main() {
   [ $# -ge 1 ] || die "which experiment? See ./pmeta screenshot --help."
-  local experiment=$1 file=$PWD/$1.png assignments=() config
+  local experiment=$1 file assignments=() config
   config=$(config_of "$experiment")
+  file=$PWD/$(basename "${config%.*}").png
   shift
   while [ $# -gt 0 ]; do
     case $1 in

@@ -49,6 +49,14 @@ TEST(Join, PutsSeparatorsBetweenWords) {
   EXPECT_EQ(join({"", "b"}), ", b");
 }
 
+TEST(NearestFirst, KeepsTheOrderOfThoseThatAreAsFar) {
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(nearestFirst("tip", {"elbow", "trip", "tip_2", "tap"}),
+            (Names{"trip", "tap", "tip_2", "elbow"}));
+  EXPECT_EQ(nearestFirst("", {"b", "a"}), (Names{"b", "a"}));
+  EXPECT_EQ(nearestFirst("x", {}), Names{});
+}
+
 TEST(UnknownName, ListsTheKnownAndTheNearest) {
   EXPECT_EQ(unknownName("rule", "medin", {"mean", "median"}),
             "unknown rule 'medin': did you mean 'median'? Known are mean, median.");

@@ -352,5 +352,32 @@ TEST(Range, TellsWhatItHolds) {
   EXPECT_EQ((Range{0, 1, true, true}.text()), "above 0 to below 1");
 }
 
+TEST(Settings, ListedStandInTheirOrder) {
+  const YAML::Node map =
+      YAML::Load("{b: {y: 1, x: {w: [2, 3], empty: {}}}, b.z: dotted, a: , c: word}");
+  EXPECT_EQ(listedSettings(map),
+            (ListedSettings{{"b.y", "1"},
+                            {"b.x.w", "[2, 3]"},
+                            {"b.x.empty", "{}"},
+                            {"b.z", "dotted"},
+                            {"a", "~"},
+                            {"c", "word"}}));
+  EXPECT_EQ(flatSettings(map).at("b.x.w"), "[2, 3]");
+}
+
+TEST(Settings, TakeTheLastPartsOfLongKeys) {
+  double one = 1, other = 2;
+  Settings settings;
+  settings.bind("environment.rewards.near.weight", one, "a");
+  settings.bind("environment.rewards.far.weight", other, "b");
+  settings.assign("near.weight:=5");
+  EXPECT_EQ(one, 5);
+  EXPECT_EQ(settings.text("rewards.far.weight", "a test"), "2");
+  EXPECT_EQ(errorOf([&] { settings.assign("weight:=5"); }),
+            "setting 'weight' is ambiguous: write one of environment.rewards.near.weight, "
+            "environment.rewards.far.weight.");
+  EXPECT_NE(errorOf([&] { settings.assign("ear.weight:=5"); }), "(no error)");
+}
+
 }  // namespace
 }  // namespace pmeta

@@ -50,11 +50,28 @@ TEST(Env, AStepIsJudgedByItsSparseRewardIfItHasOne) {
   EXPECT_EQ((Step{-2, false, false, 0}).evaluatedReward(), 0);
 }
 
+// a family with its default settings, or with those of a file where it has none
+std::unique_ptr<EnvFamily> familyOf(const std::string& name) {
+  auto family = envFamilies().at(name)();
+  if (name == "mjcf") {
+    YAML::Node file = loadYamlFile(PMETA_TEST_DATA "/mjcf/ant_fwd_back.yaml");
+    file.remove("experiment");
+    file.remove("learner");
+    file["environment"].remove("name");
+    Settings settings;
+    family->outline(listedSettings(file));
+    family->bind(settings);
+    settings.read(file, "ant_fwd_back.yaml");
+    family->model()->file = std::string(PMETA_TEST_DATA "/mjcf/") + family->model()->file;
+  }
+  family->build(0);
+  return family;
+}
+
 // training and test tasks have names of their own, and the environments that the names promise
 TEST(Env, FamiliesTellTheirTasksApart) {
   for (const std::string& name : envFamilies().names()) {
-    const auto family = envFamilies().at(name)();
-    family->build(0);
+    const auto family = familyOf(name);
     std::set<std::string> names;
     const int count = family->numTasks() + family->numTestTasks();
     for (int task = 0; task < count; ++task) {
@@ -71,8 +88,7 @@ TEST(Env, FamiliesTellTheirTasksApart) {
 // every family hands out states that go on as the original does
 TEST(Env, GoesOnFromItsState) {
   for (const std::string& name : envFamilies().names()) {
-    const auto family = envFamilies().at(name)();
-    family->build(0);
+    const auto family = familyOf(name);
     const auto one = family->make(0), other = family->make(0);
     const EnvSpec& spec = one->spec();
     std::vector<double> seen(spec.observation_size), again(spec.observation_size);
@@ -116,8 +132,7 @@ TEST(EnvSpec, ShippedFamiliesDescribeAllTheirNumbersAndKeepTheBounds) {
   constexpr double kRounding = 1e-9;
   for (const std::string& name : envFamilies().names()) {
     SCOPED_TRACE(name);
-    const auto family = envFamilies().at(name)();
-    family->build(0);
+    const auto family = familyOf(name);
     for (int task = 0; task < family->numTasks(); task += 3) {
       const auto env = family->make(task);
       const EnvSpec& spec = env->spec();
@@ -155,8 +170,7 @@ TEST(EnvSpec, ShippedFamiliesDescribeAllTheirNumbersAndKeepTheBounds) {
 
 TEST(EnvSpec, RestorableIsWhatRestores) {
   for (const std::string& name : envFamilies().names()) {
-    const auto family = envFamilies().at(name)();
-    family->build(0);
+    const auto family = familyOf(name);
     const auto env = family->make(0);
     EXPECT_TRUE(env->spec().restorable) << name;
     std::vector<double> observation(env->spec().observation.size());

@@ -40,6 +40,15 @@ std::string nearest(const std::string& word, const std::vector<std::string>& can
   return best;
 }
 
+std::vector<std::string> nearestFirst(const std::string& word,
+                                      std::vector<std::string> candidates) {
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [&](const std::string& a, const std::string& b) {
+                     return editDistance(word, a) < editDistance(word, b);
+                   });
+  return candidates;
+}
+
 std::string didYouMean(const std::string& word, const std::vector<std::string>& known) {
   const std::string guess = nearest(word, known);
   return guess.empty() ? "." : ": did you mean '" + guess + "'?";

@@ -20,6 +20,12 @@ std::string lastPart(const std::string& key) {
   return dot == std::string::npos ? key : key.substr(dot + 1);
 }
 
+// "forward.weight" and "weight" both stand for "environment.rewards.forward.weight"
+bool endsWith(const std::string& key, const std::string& name) {
+  const std::string end = "." + name;
+  return key.size() > end.size() && key.compare(key.size() - end.size(), end.size(), end) == 0;
+}
+
 std::string where(const std::string& source, const YAML::Node& node) {
   const int line = node.Mark().line;
   return line < 0 ? source : source + " line " + std::to_string(line + 1);
@@ -93,7 +99,7 @@ std::string Settings::resolve(const std::string& name, const std::string& source
   std::vector<std::string> matches;
   const auto depth = [](const std::string& key) { return std::count(key.begin(), key.end(), '.'); };
   for (const Entry& entry : entries_) {
-    if (lastPart(entry.key) != name) continue;
+    if (!endsWith(entry.key, name)) continue;
     // a group within a group takes no name from the one around it
     if (!matches.empty() && depth(entry.key) != depth(matches.front())) {
       if (depth(entry.key) > depth(matches.front())) continue;
@@ -106,6 +112,10 @@ std::string Settings::resolve(const std::string& name, const std::string& source
     throw Error("setting '" + name + "' is ambiguous: write one of " + join(matches) + ".");
   }
   return matches.front();
+}
+
+std::string Settings::text(const std::string& name, const std::string& source) const {
+  return find(resolve(name, source))->text();
 }
 
 std::string Settings::yaml() const {
@@ -210,18 +220,24 @@ YAML::Node loadYamlFile(const std::string& path) {
   return parseYaml(readFileOrPipe(path, "the settings file"), path);
 }
 
-std::map<std::string, std::string> flatSettings(const YAML::Node& map) {
-  std::map<std::string, std::string> values;
+ListedSettings listedSettings(const YAML::Node& map) {
+  ListedSettings values;
   for (const auto& item : map) {
     const std::string key = item.first.Scalar();
-    if (!item.second.IsMap()) {
-      values[key] = YAML::Dump(item.second);
+    if (!item.second.IsMap() || item.second.size() == 0) {
+      values.emplace_back(key, YAML::Dump(item.second));
       continue;
     }
-    for (const auto& inner : flatSettings(item.second))
-      values[key + "." + inner.first] = inner.second;
+    for (const auto& [inner, value] : listedSettings(item.second)) {
+      values.emplace_back(key + "." + inner, value);
+    }
   }
   return values;
+}
+
+std::map<std::string, std::string> flatSettings(const YAML::Node& map) {
+  const ListedSettings listed = listedSettings(map);
+  return {listed.begin(), listed.end()};
 }
 
 }  // namespace pmeta

@@ -13,6 +13,15 @@ Registry<EnvFamilyMaker>& envFamilies() {
   return families;
 }
 
+void ModelChoice::take(const std::string& found, const std::string& source) {
+  if (!hash.empty() && hash != found) {
+    throw Error("the model " + source + " has the hash " + found +
+                ", but environment.model_hash is " + hash +
+                ": give the model that this was made with, or model_hash:=\"\" to take this one.");
+  }
+  hash = found;
+}
+
 std::vector<double> Env::state() const {
   throw Error("environment '" + spec().name + "' cannot hand out its state.");
 }

@@ -1,5 +1,7 @@
 #include "pmeta_core/env/mujoco_env.h"
 
+#include <algorithm>
+
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/hash.h"
 #include "pmeta_core/env/model_files.h"
@@ -69,14 +71,16 @@ Step MujocoEnv::step(const double* action, Rng&, double* observation) {
 
 std::vector<double> MujocoEnv::state() const {
   std::vector<double> state;
-  simulation_.appendState(torso_body_, state);
+  simulation_.appendState(state);
+  state.insert(state.end(), torso_, torso_ + 3);
   state.push_back(steps_);
   return state;
 }
 
 void MujocoEnv::setState(const std::vector<double>& state) {
-  requireState(spec_, state, simulation_.stateSize() + 1);
-  simulation_.setState(torso_body_, state.data());
+  requireState(spec_, state, simulation_.stateSize() + 3 + 1);
+  const double* torso = simulation_.setState(state.data());
+  std::copy_n(torso, 3, simulation_.bodyPosition(torso_body_));
   steps_ = static_cast<int>(state.back());
 }
 
@@ -103,12 +107,7 @@ std::shared_ptr<const MujocoModel> MujocoSettings::open(const MujocoLayout& layo
   auto opened = MujocoModel::open(model.file, layout);
   const std::string found =
       model.file.empty() ? hashText(shippedModel(layout.model)) : ModelFiles::find(model.file).hash;
-  if (!model.hash.empty() && model.hash != found) {
-    throw Error("the model " + opened->source() + " has the hash " + found +
-                ", but environment.model_hash is " + model.hash +
-                ": give the model that this was made with, or model_hash:=\"\" to take this one.");
-  }
-  model.hash = found;
+  model.take(found, opened->source());
   return opened;
 }
 

@@ -82,17 +82,26 @@ MujocoKinematics::MujocoKinematics(const MujocoModel& model)
     shapes_.push_back(std::move(*shape));
     geoms_.push_back(static_cast<std::size_t>(geom));
   }
-  pose(m->qpos0);
+  pose(restConfiguration().data());
 }
 
-int MujocoKinematics::nq() const { return model_.get()->nq; }
+int MujocoKinematics::nq() const { return model_.get()->nq + 3 * model_.get()->nmocap; }
 
 std::vector<double> MujocoKinematics::restConfiguration() const {
-  return {model_.get()->qpos0, model_.get()->qpos0 + nq()};
+  const mjModel* m = model_.get();
+  std::vector<double> rest(m->qpos0, m->qpos0 + m->nq);
+  rest.resize(static_cast<std::size_t>(nq()));
+  for (int body = 0; body < m->nbody; ++body) {
+    if (m->body_mocapid[body] < 0) continue;
+    std::copy_n(m->body_pos + 3 * body, 3, rest.data() + m->nq + 3 * m->body_mocapid[body]);
+  }
+  return rest;
 }
 
-void MujocoKinematics::pose(const double* qpos) {
-  std::copy_n(qpos, nq(), data_->qpos);
+void MujocoKinematics::pose(const double* configuration) {
+  const mjModel* m = model_.get();
+  std::copy_n(configuration, m->nq, data_->qpos);
+  std::copy_n(configuration + m->nq, 3 * m->nmocap, data_->mocap_pos);
   mj_kinematics(model_.get(), data_.get());
 }
 

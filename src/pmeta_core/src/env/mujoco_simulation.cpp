@@ -46,24 +46,33 @@ int MujocoSimulation::numBodies() const { return model_->get()->nbody; }
 
 const double* MujocoSimulation::bodyPosition(int body) const { return data_->xpos + 3 * body; }
 
+double* MujocoSimulation::bodyPosition(int body) { return data_->xpos + 3 * body; }
+
 void MujocoSimulation::clear() { mj_resetData(model_->get(), data_.get()); }
 
-void MujocoSimulation::forward() {
+void MujocoSimulation::forward(int step) {
   mj_forward(model_->get(), data_.get());
-  check(0);
+  check(step);
 }
 
 void MujocoSimulation::step(const double* action, int step) {
   for (int i = 0; i < nu_; ++i) {
     if (!std::isfinite(action[i])) {
-      throw Error(at(step) + "action[" + std::to_string(i) + "] (" +
-                  mj_id2name(model_->get(), mjOBJ_ACTUATOR, i) +
-                  ") is not finite; the episode cannot go on, reset it.");
+      refuseAction(step, static_cast<std::size_t>(i), mj_id2name(model_->get(), mjOBJ_ACTUATOR, i));
     }
     control_[i] = std::clamp(action[i], -1.0, 1.0);
   }
+  advance(step);
+}
+
+void MujocoSimulation::advance(int step) {
   for (int i = 0; i < frame_skip_; ++i) mj_step(model_->get(), data_.get());
   check(step);
+}
+
+void MujocoSimulation::refuseAction(int step, std::size_t index, const std::string& name) const {
+  throw Error(at(step) + "action[" + std::to_string(index) + "] (" + name +
+              ") is not finite; the episode cannot go on, reset it.");
 }
 
 void MujocoSimulation::computeContactForces() { mj_rnePostConstraint(model_->get(), data_.get()); }
@@ -71,20 +80,20 @@ void MujocoSimulation::computeContactForces() { mj_rnePostConstraint(model_->get
 const double* MujocoSimulation::contactForces() const { return data_->cfrc_ext; }
 
 std::size_t MujocoSimulation::stateSize() const {
-  return static_cast<std::size_t>(nq_) + 2 * static_cast<std::size_t>(nv_) + 3;
+  return static_cast<std::size_t>(nq_ + 2 * nv_ + model_->get()->na);
 }
 
-void MujocoSimulation::appendState(int tracked, std::vector<double>& state) const {
+void MujocoSimulation::appendState(std::vector<double>& state) const {
   const auto append = [&](const double* values, int n) {
     state.insert(state.end(), values, values + n);
   };
   append(qpos_, nq_);
   append(qvel_, nv_);
+  append(data_->act, model_->get()->na);
   append(data_->qacc_warmstart, nv_);
-  append(bodyPosition(tracked), 3);
 }
 
-void MujocoSimulation::setState(int tracked, const double* state) {
+const double* MujocoSimulation::setState(const double* state) {
   clear();
   const auto take = [&](double* values, int n) {
     std::copy_n(state, n, values);
@@ -92,8 +101,9 @@ void MujocoSimulation::setState(int tracked, const double* state) {
   };
   take(qpos_, nq_);
   take(qvel_, nv_);
+  take(data_->act, model_->get()->na);
   take(data_->qacc_warmstart, nv_);
-  take(data_->xpos + 3 * tracked, 3);
+  return state;
 }
 
 // MuJoCo counts what it would warn of and then goes on from the rest configuration

@@ -65,10 +65,12 @@ void Experiment::copyModel() const {
 std::string Experiment::describe() const {
   Experiment defaults;
   defaults.family_ = envFamilies().at(settings_.environment)();
+  const YAML::Node effective = parseYaml(yaml_, "the settings");
+  defaults.family_->outline(listedSettings(effective));
   Settings settings;
   defaults.chooseKinds(settings_.algorithm, settings_.learner);
   defaults.bind(settings);
-  settings.read(parseYaml(yaml_, "the settings"), "the settings");
+  settings.read(effective, "the settings");
   return settings.table(true);
 }
 

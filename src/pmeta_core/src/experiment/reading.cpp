@@ -39,6 +39,26 @@ std::string peek(const std::vector<YAML::Node>& files, const std::vector<std::st
   return fallback;
 }
 
+// what files and overrides say of the environment, in their order
+ListedSettings environmentSettings(const std::vector<YAML::Node>& files,
+                                   const std::vector<std::string>& overrides) {
+  static const std::string kGroup = "environment.";
+  ListedSettings given;
+  for (const YAML::Node& file : files) {
+    const YAML::Node environment = file["environment"];
+    if (!environment || !environment.IsMap()) continue;
+    for (const auto& [key, value] : listedSettings(environment)) {
+      given.emplace_back(kGroup + key, value);
+    }
+  }
+  for (const std::string& assignment : overrides) {
+    const auto split = assignment.find(":=");
+    if (split == std::string::npos || assignment.rfind(kGroup, 0) != 0) continue;
+    given.emplace_back(assignment.substr(0, split), assignment.substr(split + 2));
+  }
+  return given;
+}
+
 // the group of that name, taken out in place: a clone would forget its line numbers
 YAML::Node taken(YAML::Node& from, const std::string& name) {
   const YAML::Node group = from[name];
@@ -189,6 +209,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   experiment.family_ = envFamilies().at(
       peek(files, overrides, "environment", "name", experiment.settings_.environment))();
 
+  experiment.family_->outline(environmentSettings(files, overrides));
   if (experiment.hasMetaLearner()) {
     for (const YAML::Node& file : files) removeAgentSettings(file);
   }

@@ -1,5 +1,4 @@
-// pmeta_local: experiments, sweeps and the theory's measurements in one process, without a ROS
-// master
+// pmeta_local: experiments, sweeps and the theory's measurements in one process, without ROS
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +17,7 @@
 #include "pmeta_core/base/process.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/experiment/results_dir.h"
+#include "pmeta_core/mjcf/design.h"
 #include "pmeta_core/run/console.h"
 #include "pmeta_core/run/loaded_policy.h"
 #include "pmeta_core/run/local_runner.h"
@@ -45,24 +45,20 @@ constexpr char kUsage[] =
   run CONFIG resume:=RUN_DIR           go on with a run that was stopped or killed, from its newest
                                        checkpoints and with its own settings
   sweep CONFIG key:=a,b,c ... [--name NAME] [--jobs N] [--resume] [--dry-run]
-                                       run it for every combination of values; seed:=0-9 is a range.
-                                       Run again to go on where it stopped: with the run that was
-                                       cut off, or with --resume within it, from its checkpoints.
-                                       --dry-run only lists the runs: status and folder.
-                                       A run that fails keeps no other from being run: those are
-                                       listed at the end, the exit code is 1, and the same command
-                                       tries them again.
+      run it for every combination of values; seed:=0-9 is a range. Run again to go on where it
+      stopped: with the run that was cut off, or with --resume within it, from its checkpoints.
+      --dry-run only lists the runs: status and folder. A run that fails keeps no other from being run:
+      those are listed at the end, the exit code is 1, and the same command tries them again.
   convergence CONFIG [key:=value ...]  measure the theory's statements on known models
   check CONFIG [key:=value ...]        check the settings and print the effective ones as YAML
   key FILE                             make a key for key_file:=FILE; never overwrites
-  settings CONFIG [key:=value ...]     list every setting: its value, the default and its meaning
+  settings CONFIG [key:=value ...]     list every setting: its value, the default and its meaning;
+                                       settings mjcf: every term of a robot in YAML
   replay KIND FILE [--tasks FILE]      simulate recorded trajectories (CSV, also gzip) again and
-                                       compare. KIND: ant, cartpole, half_cheetah, mountaincar,
-                                       sparse_point, walker2d, walker2d_params. sparse_point and
-                                       walker2d_params need the file of their tasks; of cartpole
-                                       and mountaincar they are the paper's unless it is given.
-                                       ant_model, half_cheetah_model, walker2d_model compare a file of
-                                       figures of the compiled model instead.
+      compare. KIND: ant, cartpole, half_cheetah, mountaincar, sparse_point, walker2d, walker2d_params.
+      sparse_point and walker2d_params need the file of their tasks; of cartpole and mountaincar they
+      are the paper's unless it is given. ant_model, half_cheetah_model, walker2d_model compare a file
+      of figures of the compiled model instead.
   evaluate POLICY_FILE [--episodes N] [--task I]
                                        returns of a trained policy (policies/*.safetensors) on at least
                                        N (100) fresh episodes, of its own task or, meta, of every one
@@ -279,6 +275,10 @@ int check(Arguments arguments) {
 
 int settings(Arguments arguments) {
   const std::string config = takeConfig(arguments);
+  if (config == pmeta::kMjcf) {
+    std::cout << pmeta::describeTerms();
+    return 0;
+  }
   const YAML::Node name = pmeta::loadYamlFile(config)["experiment"];
   const bool theory = name && name.IsScalar() && name.Scalar() == "convergence";
   std::cout << (theory ? pmeta::describeConvergence(pmeta::loadConvergence(config, arguments.words))

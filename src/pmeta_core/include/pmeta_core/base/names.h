@@ -8,6 +8,9 @@ namespace pmeta {
 /// The candidate closest to `word` by edit distance, or "" if none is close.
 std::string nearest(const std::string& word, const std::vector<std::string>& candidates);
 
+/// All of them, the closest to `word` first.
+std::vector<std::string> nearestFirst(const std::string& word, std::vector<std::string> candidates);
+
 /// The end of a sentence about a word that is none of `known`: ": did you mean 'gridworld'?", or
 /// "." where none is close.
 std::string didYouMean(const std::string& word, const std::vector<std::string>& known);

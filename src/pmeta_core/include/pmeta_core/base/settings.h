@@ -77,13 +77,16 @@ class Settings {
   /// Reads a map of (nested) settings; `source` names it in errors.
   void read(const YAML::Node& root, const std::string& source);
 
-  /// Applies "key:=value"; the key may be shortened to its last part where that is unambiguous: of
-  /// several keys that end so the one with the fewest parts.
+  /// Applies "key:=value"; the key may be shortened to its last parts where that is unambiguous: of
+  /// several keys that end so, to that with the fewest parts.
   /// The value is YAML, e.g. "lambda:=5" or "sizes:=[4,5]".
   void assign(const std::string& assignment);
 
   /// The full key that `name` (full or shortened) stands for.
   std::string resolve(const std::string& name, const std::string& source) const;
+
+  /// The value of a setting as YAML text; `name` as resolve() takes it.
+  std::string text(const std::string& name, const std::string& source) const;
 
   /// Every setting as YAML text, in binding order. Reading it again gives the same values.
   std::string yaml() const;
@@ -120,7 +123,12 @@ YAML::Node loadYamlFile(const std::string& path);
 /// Parses YAML text that must be a map; `source` names it in errors.
 YAML::Node parseYaml(const std::string& text, const std::string& source);
 
-/// A map of (nested) settings by full key; each value as YAML text.
+/// (full key, value as YAML text) of a map of (nested) settings, in the order in which they stand; an
+/// empty group is "{}", or "~" if it is nothing.
+using ListedSettings = std::vector<std::pair<std::string, std::string>>;
+ListedSettings listedSettings(const YAML::Node& map);
+
+/// The same by key.
 std::map<std::string, std::string> flatSettings(const YAML::Node& map);
 
 }  // namespace pmeta

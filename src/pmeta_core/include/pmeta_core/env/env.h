@@ -88,6 +88,10 @@ void requireState(const EnvSpec& spec, const std::vector<double>& state, std::si
 struct ModelChoice {
   std::string file;  ///< "" for the shipped one
   std::string hash;  ///< of that model, or "" for any; set by EnvFamily::build()
+
+  /// Takes up the hash of the model that was opened. Throws Error if another was asked for; `source`
+  /// names the model.
+  void take(const std::string& found, const std::string& source);
 };
 
 /// A family of MDPs, the tasks of one experiment: its settings, and the tasks that follow from
@@ -95,6 +99,10 @@ struct ModelChoice {
 class EnvFamily {
  public:
   virtual ~EnvFamily() = default;
+
+  /// Comes before bind(): all that files and overrides say below "environment.", in their order, for
+  /// a family whose settings follow from what is said. Throws Error.
+  virtual void outline(const ListedSettings& /*given*/) {}
 
   /// Binds the family's settings below "environment.".
   virtual void bind(Settings& settings) = 0;

@@ -37,13 +37,14 @@ class MujocoKinematics {
 
   /// In the order of the model's geoms.
   const std::vector<GeomShape>& shapes() const { return shapes_; }
-  int nq() const;  ///< numbers in a configuration
+  /// Numbers in a configuration: the model's nq, then three for the position of each mocap body.
+  int nq() const;
 
   /// The configuration that the model rests in, nq().
   std::vector<double> restConfiguration() const;
 
   /// Takes up a configuration of nq() numbers; quaternions need not be normalised.
-  void pose(const double* qpos);
+  void pose(const double* configuration);
 
   /// Centre (m) of shape `index` and its orientation (3 x 3, row-major), world axes, in the last
   /// pose().

@@ -38,17 +38,28 @@ class MujocoSimulation {
   /// that of the last evaluation within the step, not of the configuration the step ended in:
   /// MuJoCo does not evaluate once more, and neither does Gym.
   const double* bodyPosition(int body) const;
+  double* bodyPosition(int body);  ///< the same, to be written to when a state is restored
+
+  const mjData_* data() const { return data_.get(); }  ///< MuJoCo's own structure
+  /// The same, to be written to: control, applied forces and the like.
+  mjData_* data() { return data_.get(); }
 
   /// Back to the model's rest configuration, at rest.
   void clear();
 
   /// Evaluates all that follows from the configuration and velocity, as a start needs. MuJoCo
-  /// normalises quaternions on the way.
-  void forward();
+  /// normalises quaternions on the way. `step` is how many there have been, for errors.
+  void forward(int step = 0);
 
   /// Steps with `action` (nu numbers, clipped to [-1, 1]); `step` is its number, for errors. Throws
   /// Error on an action that is not finite: that is no fault of the simulation.
   void step(const double* action, int step);
+
+  /// The same with the controls and applied forces that data() holds.
+  void advance(int step);
+
+  /// What step() throws on an action that is not finite; `name` is that of its number `index`.
+  [[noreturn]] void refuseAction(int step, std::size_t index, const std::string& name) const;
 
   /// Works out contactForces() from the last step; changes nothing that later steps depend on.
   void computeContactForces();
@@ -56,15 +67,15 @@ class MujocoSimulation {
   /// External contact torque and force on each body (N m, N), 6 numbers each, the world first.
   const double* contactForces() const;
 
-  /// Length of state().
+  /// Length of what appendState() appends.
   std::size_t stateSize() const;
 
-  /// Configuration, velocity, the solver's warm start and the position of body `tracked`: all that
-  /// a step and its environment depend on.
-  void appendState(int tracked, std::vector<double>& state) const;
+  /// Configuration, velocity, activations of actuators (of those that have some), and the solver's
+  /// warm start: all that a step depends on, but for its control.
+  void appendState(std::vector<double>& state) const;
 
-  /// Goes on from there.
-  void setState(int tracked, const double* state);
+  /// Goes on from there; gives where the state's numbers end.
+  const double* setState(const double* state);
 
  private:
   void check(int step) const;
