@@ -110,17 +110,21 @@ ELSEWHERE = {
 def registered_names():
     """{name: the files that register it}"""
     names = {}
+    constant = re.compile(r'constexpr char (k\w+)\[\] = "(\w+)";')
+    shared = {key: (value, path.name) for path in (TOP / "src").rglob("*.h")
+              for key, value in constant.findall(path.read_text())}
     for path in (TOP / "src").rglob("*.cpp"):
         text = path.read_text()
         if "Registered" not in text:
             continue
-        constants = dict(re.findall(r'constexpr char (k\w+)\[\] = "(\w+)";', text))
-        for row in re.findall(r"^const (?:Registered|Row)[^;]*;", text, re.M):
-            words = [text or constants.get(constant)
-                     for text, constant in re.findall(r'"(\w+)"|\b(k\w+)', row)]
+        constants = dict(constant.findall(text))
+        # terms of mjcf are words of mechanics, which others use for what they measure
+        for row in re.findall(r"^const (?:Registered(?!Term)|Row)[^;]*;", text, re.M):
+            words = [(text or constants.get(key), path.name) if not key or key in constants
+                     else shared.get(key) for text, key in re.findall(r'"(\w+)"|\b(k\w+)', row)]
             # of a row the name comes first
-            name = next(word for word in words if word)
-            names.setdefault(name, set()).add(path.name)
+            name, file = next(word for word in words if word)
+            names.setdefault(name, set()).update({path.name, file})
     return names
 
 

@@ -158,74 +158,90 @@ std::string exploringPolicy(const std::string& folder) {
   return log.dir() + "/policies/meta.safetensors";
 }
 
+// a policy_node that explores, and who drives it, in a namespace of their own
+class Explorer {
+ public:
+  explicit Explorer(const std::string& path) : expected(path) {
+    const std::string policy = "_policy:=" + path;
+    pid_ = start({"policy_node", policy.c_str(), "_seed:=5", "__ns:=explorer", "__name:=explorer"});
+    EXPECT_TRUE(expected.explore(5));
+  }
+
+  bool connected() {
+    return observations_.getNumSubscribers() > 0 && rewards_.getNumSubscribers() > 0 &&
+           actions_.getNumPublishers() > 0 && ros::service::exists("explorer/begin_episode", false);
+  }
+  void send(double x) {
+    Float64MultiArray msg;
+    msg.data = {x, 0.2};
+    observations_.publish(msg);
+  }
+  void sendReward(double value) {
+    std_msgs::Float64 msg;
+    msg.data = value;
+    rewards_.publish(msg);
+  }
+  // what it says of itself
+  std::string beginEpisode() {
+    std_srvs::Trigger begin;
+    EXPECT_TRUE(ros::service::call("explorer/begin_episode", begin));
+    expected.beginEpisode();
+    return begin.response.message;
+  }
+  int end() const {
+    kill(pid_, SIGINT);
+    int status = -1;
+    waitpid(pid_, &status, 0);
+    return status;
+  }
+
+  pmeta::LoadedPolicy expected;               // does the same in this process
+  std::optional<std::vector<double>> action;  // the last answer
+
+ private:
+  ros::NodeHandle nh_{"explorer"};
+  ros::Publisher observations_ = nh_.advertise<Float64MultiArray>("observation", 1);
+  ros::Publisher rewards_ = nh_.advertise<std_msgs::Float64>("reward", 1);
+  ros::Subscriber actions_ = nh_.subscribe<Float64MultiArray>(
+      "action", 1, [this](const Float64MultiArray::ConstPtr& msg) { action = msg->data; });
+  int pid_ = -1;
+};
+
 TEST_F(PolicyNodeTest, AMetaPolicyFindsOutItsTaskBeforeItActs) {
   char folder[] = "/tmp/pmeta_policy_XXXXXX";
   ASSERT_NE(mkdtemp(folder), nullptr);
-  const std::string path = exploringPolicy(folder);
-  pmeta::LoadedPolicy expected(path);
-  ASSERT_TRUE(expected.explore(5));
-
-  ros::NodeHandle there("explorer");
-  const ros::Publisher observations = there.advertise<Float64MultiArray>("observation", 1);
-  const ros::Publisher rewards = there.advertise<std_msgs::Float64>("reward", 1);
-  std::optional<std::vector<double>> action;
-  const ros::Subscriber actions = there.subscribe<Float64MultiArray>(
-      "action", 1, [&](const Float64MultiArray::ConstPtr& msg) { action = msg->data; });
-  const std::string policy = "_policy:=" + path;
-  const int pid =
-      start({"policy_node", policy.c_str(), "_seed:=5", "__ns:=explorer", "__name:=explorer"});
-  ASSERT_TRUE(waitFor(
-      [&] {
-        return observations.getNumSubscribers() > 0 && rewards.getNumSubscribers() > 0 &&
-               actions.getNumPublishers() > 0 &&
-               ros::service::exists("explorer/begin_episode", false);
-      },
-      20));
-  const auto send = [&](double x) {
-    Float64MultiArray msg;
-    msg.data = {x, 0.2};
-    observations.publish(msg);
-  };
-  const auto sendReward = [&](double value) {
-    std_msgs::Float64 msg;
-    msg.data = value;
-    rewards.publish(msg);
-  };
-
+  Explorer explorer(exploringPolicy(folder));
+  ASSERT_TRUE(waitFor([&] { return explorer.connected(); }, 20));
+  const auto answered = [&] { return explorer.action.has_value(); };
   for (int episode = 1; episode <= 3; ++episode) {
-    std_srvs::Trigger begin;
-    ASSERT_TRUE(ros::service::call("explorer/begin_episode", begin));
-    EXPECT_EQ(begin.response.message,
-              episode == 3 ? "acting" : "exploring, episode " + std::to_string(episode) + " of 2");
-    expected.beginEpisode();
+    const bool explores = episode < 3;
+    EXPECT_EQ(explorer.beginEpisode(),
+              explores ? "exploring, episode " + std::to_string(episode) + " of 2" : "acting");
     double x = 0.1 * episode;
-    send(x);
+    explorer.send(x);
     for (int t = 0; t < 6; ++t) {
-      std::vector<double> answer(2);
+      std::vector<double> expected(2);
       const double here[] = {x, 0.2};
-      ASSERT_TRUE(expected.act(here, answer.data()));
-      ASSERT_TRUE(waitFor([&] { return action.has_value(); }, 5)) << episode << ", " << t;
-      EXPECT_EQ(*action, answer) << "episode " << episode << ", step " << t;
-      action.reset();
-      x += 0.1 * answer[0];
+      ASSERT_TRUE(explorer.expected.act(here, expected.data()));
+      ASSERT_TRUE(waitFor(answered, 5)) << "episode " << episode << ", step " << t;
+      EXPECT_EQ(*explorer.action, expected) << "episode " << episode << ", step " << t;
+      explorer.action.reset();
+      x += 0.1 * expected[0];
       const double next[] = {x, 0.2};
-      expected.observe(t % 2, next);
+      explorer.expected.observe(t % 2, next);
       // in either order; a policy that knows its task needs no reward
-      if (t % 2 == 0) send(x);
-      if (episode < 3) {
-        if (t % 2 == 0) {
-          EXPECT_FALSE(waitFor([&] { return action.has_value(); }, 0.05)) << "half of it is known";
-        }
-        sendReward(t % 2);
+      const bool reward_first = t % 2 == 1;
+      if (!reward_first) explorer.send(x);
+      if (explores && !reward_first) {
+        EXPECT_FALSE(waitFor(answered, 0.05)) << "half of it is known";
       }
-      if (t % 2 == 1) send(x);
+      if (explores) explorer.sendReward(t % 2);
+      if (reward_first) explorer.send(x);
     }
-    ASSERT_TRUE(waitFor([&] { return action.has_value(); }, 5));
-    action.reset();
+    ASSERT_TRUE(waitFor(answered, 5));
+    explorer.action.reset();
   }
-  kill(pid, SIGINT);
-  int status = -1;
-  waitpid(pid, &status, 0);
+  const int status = explorer.end();
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
   std::filesystem::remove_all(folder);
 }
