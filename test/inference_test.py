@@ -28,7 +28,7 @@ def test_each_seed_has_its_last_and_its_late_returns(explored):
     top, folders = explored
     heads, lines = pi.inference_cells(only_group(top))
     assert heads[:5] == ("seed", "PP", "MP after 0", "MP after 2", "MP after 2, unseen")
-    assert [line[0] for line in lines] == ["3", "4", "mean"]
+    assert [line[0] for line in lines] == ["3", "4", "mean of the seeds"]
     for folder, line in zip(folders, lines):
         for cell, (policy, split, context) in zip(line[1:5], (
                 ("personal", "train", 0), ("meta", "train", 0), ("meta", "train", 2),

@@ -93,6 +93,7 @@ ELSEWHERE = {
     ("mean", "console.cpp"), ("mean", "pmeta_figures.py"), ("mean", "pmeta_sections.py"),
     ("mean", "pmeta_tables.py"),  # a column
     ("mean", "rl2_networks.cpp"), ("mean", "running_variance.cpp"),  # a block, a number
+    ("independent", "design.cpp"),  # draws
     # defaults
     ("gridworld", "experiment_settings.h"), ("q_learning", "experiment_settings.h"),
     ("pmeta", "experiment_settings.h"), ("mean", "experiment_settings.h"),

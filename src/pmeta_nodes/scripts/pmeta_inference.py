@@ -17,7 +17,7 @@ def inference_cells(groups):
     rows = [numbers_of(run, keys.values()) for run in group.runs]
     lines = [(str(run.seed),) + cells_of(row) for run, row in zip(group.runs, rows)]
     mean = [tuple(np.mean(column, axis=0)) for column in zip(*rows)]
-    return heads, lines + [("mean",) + cells_of(mean)]
+    return heads, lines + [("mean of the seeds",) + cells_of(mean)]
 
 
 def columns_of(run):
