@@ -90,7 +90,8 @@ TEST(SacTaskModel, KeepsEveryEpisodeButLearnsToActFromItsOwn) {
     EXPECT_EQ(sac(*learner).modelled().size(), 230u);
   }
   EXPECT_EQ(sac(all).replay().size(), 230u);
-  // after the warm-up and the episode begun at its end 19 of 10 steps, of which every second explores
+  // after the warm-up and the episode begun at its end 19 of 10 steps, of which every second
+  // explores
   EXPECT_EQ(sac(own).replay().size(), 140u);
 }
 

@@ -87,7 +87,7 @@ LoadedPolicy::LoadedPolicy(const std::string& path, PolicyFile file, int as_task
 }
 
 std::vector<float> LoadedPolicy::readTaskInput(const PolicyFile& file, const std::string& path,
-                                           int as_task) const {
+                                               int as_task) const {
   if (policy_ == PolicyKind::kMeta) {
     const auto input = experiment_.metaInput(as_task);
     if (input) return *input;

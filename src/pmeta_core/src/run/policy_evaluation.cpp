@@ -16,10 +16,9 @@ ReturnStats PolicyEvaluation::on(int task, int episodes) const {
     return TaskAgent(experiment, task).evaluateFresh(PolicyKind::kMeta, policy_.model(), episodes);
   }
   const std::unique_ptr<PersonalLearner> learner = experiment.makeLearner(task);
-  return overFreshEpisodes(static_cast<std::uint64_t>(experiment.settings().seed), task, episodes,
-                           [&](Rng& rng) {
-                             return learner->evaluate(policy_.model(), policy_.taskInput(), rng);
-                           });
+  return overFreshEpisodes(
+      static_cast<std::uint64_t>(experiment.settings().seed), task, episodes,
+      [&](Rng& rng) { return learner->evaluate(policy_.model(), policy_.taskInput(), rng); });
 }
 
 }  // namespace pmeta

@@ -126,7 +126,7 @@ YAML::Node parseYaml(const std::string& text, const std::string& source);
 /// (full key, value as YAML text) of a map of (nested) settings, in the order in which they stand;
 /// an empty group is "{}", or "~" if it is nothing.
 using ListedSettings = std::vector<std::pair<std::string, std::string>>;
-ListedSettings listedSettings(const YAML::Node& map);
+ListedSettings listedSettings(const YAML::Node& map);  ///< of that map
 
 /// The same by key.
 std::map<std::string, std::string> flatSettings(const YAML::Node& map);

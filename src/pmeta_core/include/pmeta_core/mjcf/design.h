@@ -48,10 +48,10 @@ class Section {
  public:
   /// One term of it.
   struct Entry {
-    std::string name;
-    std::string kind;  ///< of termsOf<Kind>(); the name, where the settings name none
-    std::unique_ptr<Kind> term;
-    Common common;
+    std::string name;            ///< as the settings have it
+    std::string kind;            ///< of termsOf<Kind>(); the name, where the settings name none
+    std::unique_ptr<Kind> term;  ///< not null
+    Common common;               ///< what all terms of the section have
   };
 
   /// `name`: its key below "environment.".
@@ -64,8 +64,8 @@ class Section {
   void bind(Settings& settings);  ///< `settings` must not outlive this
   void find(const MujocoModel& model, const OtherTerms& others);  ///< see Term::find()
 
-  const std::vector<Entry>& entries() const { return entries_; }
-  const std::string& key() const { return key_; }  ///< "environment.rewards", say
+  const std::vector<Entry>& entries() const { return entries_; }  ///< in the settings' order
+  const std::string& key() const { return key_; }                 ///< "environment.rewards", say
 
  private:
   void make();
@@ -87,7 +87,7 @@ struct MjcfDesign {
   /// Looks up what the terms name; throws Error.
   void find(const MujocoModel& opened);
 
-  ModelChoice model;
+  ModelChoice model;              ///< the file that MuJoCo reads
   int horizon = 200;              ///< steps of an episode
   int frame_skip = 1;             ///< timesteps of the model to a step
   bool refresh = true;            ///< is the end of a step evaluated once more?
@@ -95,13 +95,13 @@ struct MjcfDesign {
   bool recompute = true;          ///< of a varied model, what MuJoCo derives from its numbers?
   int train_tasks = 0;            ///< 0: as many as there are values
   int test_tasks = 0;             ///< the same of test tasks
-  Section<GoalTerm> goals;
-  Section<ObservationTerm, ObservationCommon> observations;
-  Section<ActionTerm> actions;
-  Section<RewardTerm, RewardCommon> rewards;
-  Section<TerminationTerm> terminations;
-  Section<StartTerm> starts;
-  Section<VariationTerm, VariationCommon> variations;
+  Section<GoalTerm> goals;        ///< places to go to
+  Section<ObservationTerm, ObservationCommon> observations;  ///< what is observed
+  Section<ActionTerm> actions;                         ///< what each number of an action drives
+  Section<RewardTerm, RewardCommon> rewards;           ///< what is summed up
+  Section<TerminationTerm> terminations;               ///< what ends an episode before its horizon
+  Section<StartTerm> starts;                           ///< how starts differ
+  Section<VariationTerm, VariationCommon> variations;  ///< how tasks differ
 };
 
 /// Every kind of term of every section, with its settings, their defaults and meanings: for people.

@@ -64,8 +64,8 @@ class Term {
 /// A kind of term, of those of one section.
 template <class Kind>
 struct TermRow {
-  std::string meaning;  ///< a clause with the unit, for people
-  std::function<std::unique_ptr<Kind>()> make;
+  std::string meaning;                          ///< a clause with the unit, for people
+  std::function<std::unique_ptr<Kind>()> make;  ///< one with default settings
 };
 
 /// Every kind of term of that section, by the name that `term` gives.

@@ -16,13 +16,13 @@ namespace pmeta {
 
 /// What terms look at: the simulated robot as the last step (or the reset) left it.
 struct Robot {
-  const mjModel_* model = nullptr;
-  const mjData_* data = nullptr;
-  double dt = 0;                   ///< s that a step takes
-  const double* action = nullptr;  ///< the last one, from -1 to 1; zeros at the start
-  std::size_t action_size = 0;     ///< numbers of an action
-  const double* goals = nullptr;   ///< positions of the goals (m, world axes), three numbers each
-  bool last_step = false;          ///< was that the horizon's?
+  const mjModel_* model = nullptr;  ///< as the task has it
+  const mjData_* data = nullptr;    ///< of that model
+  double dt = 0;                    ///< s that a step takes
+  const double* action = nullptr;   ///< the last one, from -1 to 1; zeros at the start
+  std::size_t action_size = 0;      ///< numbers of an action
+  const double* goals = nullptr;    ///< positions of the goals (m, world axes), three numbers each
+  bool last_step = false;           ///< was that the horizon's?
 
   const double* goal(int index) const { return goals + 3 * index; }  ///< of Elements::goal()
 };

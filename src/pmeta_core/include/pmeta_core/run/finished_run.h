@@ -26,7 +26,7 @@ class FinishedRun {
   explicit FinishedRun(std::string run_dir, const std::vector<std::string>& overrides = {});
 
   const Experiment& experiment() const { return experiment_; }  ///< by the run's settings
-  int round() const { return round_; }  ///< of training behind its policies
+  int round() const { return round_; }                          ///< of training behind its policies
 
   /// A training task's personal policy, with what its file knows of the task; nothing where there
   /// is none.

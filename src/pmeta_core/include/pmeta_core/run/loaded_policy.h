@@ -76,7 +76,8 @@ class LoadedPolicy {
   LoadedPolicy(const std::string& path, PolicyFile file, int as_task);
   bool take(const double* numbers, std::vector<float>& observation) const;
   Actor& acting();
-  std::vector<float> readTaskInput(const PolicyFile& file, const std::string& path, int as_task) const;
+  std::vector<float> readTaskInput(const PolicyFile& file, const std::string& path,
+                                   int as_task) const;
 
   Experiment experiment_;
   bool told_ = false;  ///< which task to act on
