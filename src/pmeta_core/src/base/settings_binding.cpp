@@ -53,7 +53,7 @@ bool parseInteger(const YAML::Node& node, std::int64_t& value) {
 }
 
 // text as YAML, also within a list: bare if it is a plain word, else in double quotes
-std::string quoted(const std::string& text) {
+std::string asYaml(const std::string& text) {
   // words that YAML would read as something else
   static const std::set<std::string> kReserved = {"null", "Null", "NULL", "true", "false",
                                                   "yes",  "no",   "on",   "off"};
@@ -209,7 +209,7 @@ void Settings::bind(const std::string& key, std::string& value, const std::strin
          }
          value = node.Scalar();
        },
-       [&value] { return quoted(value); }});
+       [&value] { return asYaml(value); }});
 }
 
 void Settings::bind(const std::string& key, std::vector<int>& value, const std::string& doc,
@@ -267,7 +267,7 @@ void Settings::bind(const std::string& key, std::vector<std::string>& value, con
                                          return true;
                                        });
        },
-       [&value] { return listText<std::string>(value, quoted); }});
+       [&value] { return listText<std::string>(value, asYaml); }});
 }
 
 }  // namespace pmeta

@@ -38,22 +38,26 @@ ModelArray arrayOf(const T* values, int rows, int columns) {
 // all that mjModel holds, by MuJoCo's own list of its fields
 std::map<std::string, ModelArray> arraysOf(const mjModel* m) {
   std::map<std::string, ModelArray> arrays;
-#define X(name) arrays["size." #name] = arrayOf(&m->name, 1, 1);
+  // one function, or the hundreds of lines below take long to compile
+  const auto enter = [&arrays](const char* name, const auto* values, int rows, int columns) {
+    arrays[name] = arrayOf(values, rows, columns);
+  };
+#define X(name) enter("size." #name, &m->name, 1, 1);
   MJMODEL_INTS
 #undef X
-#define X(type, name) arrays["opt." #name] = arrayOf(&m->opt.name, 1, 1);
+#define X(type, name) enter("opt." #name, &m->opt.name, 1, 1);
   MJOPTION_SCALARS
 #undef X
-#define X(name, n) arrays["opt." #name] = arrayOf(m->opt.name, 1, n);
+#define X(name, n) enter("opt." #name, m->opt.name, 1, n);
   MJOPTION_VECTORS
 #undef X
-  arrays["stat.meaninertia"] = arrayOf(&m->stat.meaninertia, 1, 1);
-  arrays["stat.meanmass"] = arrayOf(&m->stat.meanmass, 1, 1);
-  arrays["stat.meansize"] = arrayOf(&m->stat.meansize, 1, 1);
-  arrays["stat.extent"] = arrayOf(&m->stat.extent, 1, 1);
-  arrays["stat.center"] = arrayOf(m->stat.center, 1, 3);
+  enter("stat.meaninertia", &m->stat.meaninertia, 1, 1);
+  enter("stat.meanmass", &m->stat.meanmass, 1, 1);
+  enter("stat.meansize", &m->stat.meansize, 1, 1);
+  enter("stat.extent", &m->stat.extent, 1, 1);
+  enter("stat.center", m->stat.center, 1, 3);
   MJMODEL_POINTERS_PREAMBLE(m)
-#define X(type, name, nr, nc) arrays[#name] = arrayOf(m->name, m->nr, nc);
+#define X(type, name, nr, nc) enter(#name, m->name, m->nr, nc);
   MJMODEL_POINTERS
 #undef X
   return arrays;
