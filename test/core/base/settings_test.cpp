@@ -340,13 +340,12 @@ TEST(Range, TellsWhatItHolds) {
 TEST(Settings, ListedStandInTheirOrder) {
   const YAML::Node map =
       YAML::Load("{b: {y: 1, x: {w: [2, 3], empty: {}}}, b.z: dotted, a: , c: word}");
-  EXPECT_EQ(listedSettings(map),
-            (ListedSettings{{"b.y", "1"},
-                            {"b.x.w", "[2, 3]"},
-                            {"b.x.empty", "{}"},
-                            {"b.z", "dotted"},
-                            {"a", "~"},
-                            {"c", "word"}}));
+  EXPECT_EQ(listedSettings(map), (ListedSettings{{"b.y", "1"},
+                                                 {"b.x.w", "[2, 3]"},
+                                                 {"b.x.empty", "{}"},
+                                                 {"b.z", "dotted"},
+                                                 {"a", "~"},
+                                                 {"c", "word"}}));
   EXPECT_EQ(flatSettings(map).at("b.x.w"), "[2, 3]");
 }
 

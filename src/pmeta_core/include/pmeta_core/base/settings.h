@@ -122,8 +122,8 @@ YAML::Node loadYamlFile(const std::string& path);
 /// Parses YAML text that must be a map; `source` names it in errors.
 YAML::Node parseYaml(const std::string& text, const std::string& source);
 
-/// (full key, value as YAML text) of a map of (nested) settings, in the order in which they stand; an
-/// empty group is "{}", or "~" if it is nothing.
+/// (full key, value as YAML text) of a map of (nested) settings, in the order in which they stand;
+/// an empty group is "{}", or "~" if it is nothing.
 using ListedSettings = std::vector<std::pair<std::string, std::string>>;
 ListedSettings listedSettings(const YAML::Node& map);
 

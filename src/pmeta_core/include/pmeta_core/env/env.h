@@ -89,8 +89,8 @@ struct ModelChoice {
   std::string file;  ///< "" for the shipped one
   std::string hash;  ///< of that model, or "" for any; set by EnvFamily::build()
 
-  /// Takes up the hash of the model that was opened. Throws Error if another was asked for; `source`
-  /// names the model.
+  /// Takes up the hash of the model that was opened. Throws Error if another was asked for;
+  /// `source` names the model.
   void take(const std::string& found, const std::string& source);
 };
 
@@ -100,8 +100,8 @@ class EnvFamily {
  public:
   virtual ~EnvFamily() = default;
 
-  /// Comes before bind(): all that files and overrides say below "environment.", in their order, for
-  /// a family whose settings follow from what is said. Throws Error.
+  /// Comes before bind(): all that files and overrides say below "environment.", in their order,
+  /// for a family whose settings follow from what is said. Throws Error.
   virtual void outline(const ListedSettings& /*given*/) {}
 
   /// Binds the family's settings below "environment.".
