@@ -18,9 +18,6 @@ namespace pmeta {
 /// comes of it in the replay and, with an encoder, as context.
 class SacCollector : private Actor {
  public:
-  /// Episodes running that may break down.
-  static constexpr int kForgiven = 9;
-
   /// `task_input`: x of the actor, where no encoder infers it. `context`: where transitions become
   /// context; nullptr without an encoder. The networks and it must outlive the collector.
   SacCollector(std::unique_ptr<Env> env, const SacNetworks& networks, const SacSettings& settings,
