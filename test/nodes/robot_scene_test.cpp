@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/env/half_cheetah.h"
@@ -298,6 +299,27 @@ TEST(RobotScene, AModelWithoutARowIsDrawnFromItsGeomsAndGoesNowhere) {
     spaced = spaced || marker.text == "every 0.1 m";
   }
   EXPECT_TRUE(spaced);
+}
+
+TEST(RobotScene, EachTaskIsDrawnFromItsOwnModel) {
+  const std::string model = ::testing::TempDir() + "/robot_scene_rod.xml";
+  std::ofstream(model)
+      << "<mujoco><worldbody><body name='rod'><joint name='hinge' axis='0 1 0'/><geom "
+         "type='capsule' fromto='0 0 0 0 0 0.2' size='0.02'/></body></worldbody><actuator><motor "
+         "name='motor' joint='hinge' ctrllimited='true' ctrlrange='-1 1'/></actuator></mujoco>";
+  const pmeta::Experiment rods = experiment(
+      "learner: sac\nenvironment:\n  name: mjcf\n  model_file: " + model +
+      "\n  observations: {joint_positions: {}}\n  rewards: {alive: {}}\n  variations:\n    length: "
+      "{term: link_length, bodies: [rod], values: [1, 2]}\n");
+  const auto scene = makeScene(rods);
+  SceneContent content = contentOf(2);
+  for (int task = 0; task < 2; ++task) {
+    content.tasks[task].meta.episode =
+        shared(episodeOfPositions(task, Trajectory::META, {{0.0}, {0.1}}));
+  }
+  const MarkerArray moving = scene->moving(content, {0.0, 0.0});
+  EXPECT_EQ("", complaint(*scene, moving));
+  EXPECT_NEAR(2 * find(moving, "geoms", 1).scale.z, find(moving, "geoms", 3).scale.z, 1e-9);
 }
 
 }  // namespace

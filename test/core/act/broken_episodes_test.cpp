@@ -116,7 +116,7 @@ TEST(BrokenEpisodes, TrainingGivesUpWhereEachEpisodeBreaks) {
     const std::vector<float> parameters = parametersOf(learner);
     Rng rng(1, 0, Stream::kSample);
     EXPECT_THROW(learner.collect(parameters.data(), rng), BrokenEpisode);
-    EXPECT_EQ(learner.brokenEpisodes(), SacCollector::kForgiven + 1);
+    EXPECT_EQ(learner.brokenEpisodes(), BrokenEpisodes::kForgiven + 1);
     EXPECT_EQ(learner.replay().size(), starts ? 20u : 0u);
   }
 }

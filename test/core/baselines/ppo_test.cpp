@@ -116,20 +116,6 @@ TEST(Ppo, TheLossIsMadeOfItsParts) {
   for (const float d : batch.d_values) EXPECT_EQ(d, 0);
 }
 
-TEST(GeneralisedAdvantages, AreSumsOfErrorsToTheEndOfThePath) {
-  const std::vector<float> rewards = {1, -2, 0.5f}, values = {0.25f, 1, -1};
-  const double gamma = 0.9, lambda = 0.8;
-  std::vector<float> found(3);
-  generalisedAdvantages(rewards.data(), values.data(), 3, gamma, lambda, found.data());
-  const double d2 = 0.5 + 1, d1 = -2 - gamma - 1, d0 = 1 + gamma - 0.25;
-  EXPECT_NEAR(found[2], d2, 1e-6);
-  EXPECT_NEAR(found[1], d1 + gamma * lambda * d2, 1e-6);
-  EXPECT_NEAR(found[0], d0 + gamma * lambda * (d1 + gamma * lambda * d2), 1e-6);
-  // lambda 1: the discounted return less the value
-  generalisedAdvantages(rewards.data(), values.data(), 3, gamma, 1, found.data());
-  EXPECT_NEAR(found[0], 1 - 2 * gamma + 0.5 * gamma * gamma - 0.25, 1e-6);
-}
-
 TEST(RunningVariance, IsThatOfAllNumbers) {
   RunningVariance variance;
   EXPECT_EQ(variance.variance(), 1);

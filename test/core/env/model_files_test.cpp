@@ -77,6 +77,19 @@ TEST_F(ModelOfManyFiles, ACopyIsTheSameModel) {
             std::string::npos);
 }
 
+TEST(ModelFiles, MeshesOfAUrdfAreWhereMujocoLooks) {
+  const TempDir dir;
+  for (const char* name : {"meshes", "parts"}) fs::create_directories(dir / name);
+  const std::string text = R"(<robot name="arm"><mujoco><compiler meshdir="parts"/></mujoco>
+    <link name="a"><visual><geometry><mesh filename="package://arm/meshes/a.stl"/></geometry></visual>
+    <collision><geometry><mesh filename="meshes/b.stl"/></geometry></collision></link></robot>)";
+  writeFile(dir / "arm.urdf", text);
+  for (const char* name : {"parts/a.stl", "parts/b.stl", "parts/c.stl"})
+    writeFile(dir / name, "mesh");
+  EXPECT_EQ(ModelFiles::find(dir / "arm.urdf").names,
+            (Names{"arm.urdf", "parts/a.stl", "parts/b.stl"}));
+}
+
 TEST(ModelFiles, WhatCannotBeCopiedIsRefused) {
   const TempDir dir;
   writeFile(dir / "a.xml", R"(<mujoco><asset><mesh file="/meshes/arm.stl"/></asset></mujoco>)");

@@ -91,6 +91,7 @@ TEST_F(MjcfEnvTest, DescribesItsNumbers) {
 TEST_F(MjcfEnvTest, ScalesActionsToWhatTheyDrive) {
   driven_.reset();
   EXPECT_EQ(data()->ctrl[1], 0.5) << "of the keyframe";
+  EXPECT_EQ(data()->ctrl[0], seen("shoulder")) << "is held";
   driven_.action = {1, 0, -0.5};
   driven_.step();
   EXPECT_EQ(data()->ctrl[0], 4);

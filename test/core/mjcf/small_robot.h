@@ -78,6 +78,7 @@ inline constexpr char kSmallTerms[] = R"(  goals:
   starts:
     bent: {term: keyframe, keyframe: bent}
     joint_noise: {joints: [shoulder, elbow], position: 0.1}
+    hold: {actuators: [shoulder]}
 )";
 
 /// An experiment of the small robot, whose model lies in `dir`.

@@ -69,22 +69,38 @@ double LinearBaseline::value(const double* observation, std::size_t observation_
                                              static_cast<Eigen::Index>(coefficients_.size())));
 }
 
+template <class T>
+void generalisedAdvantages(const T* rewards, const T* values, std::size_t steps, double last_value,
+                           double gamma, double lambda, T* advantages) {
+  double next = last_value, sum = 0;
+  for (std::size_t t = steps; t-- > 0;) {
+    const double delta = rewards[t] + gamma * next - values[t];
+    sum = delta + gamma * lambda * sum;
+    advantages[t] = static_cast<T>(sum);
+    next = values[t];
+  }
+}
+
+template void generalisedAdvantages(const float*, const float*, std::size_t, double, double, double,
+                                    float*);
+template void generalisedAdvantages(const double*, const double*, std::size_t, double, double,
+                                    double, double*);
+
 std::vector<double> advantages(const std::vector<Path>& paths, const LinearBaseline& baseline,
                                const AdvantageSettings& settings) {
   std::vector<double> all;
   for (const Path& path : paths) {
     const std::size_t size = path.last_observation.size();
     const bool goes_on = settings.bootstrap && !path.terminated;
-    double next = goes_on ? baseline.value(path.last_observation.data(), size, path.steps()) : 0;
-    double sum = 0;
-    std::vector<double> advantages(path.steps());
-    for (std::size_t t = path.steps(); t-- > 0;) {
-      const double value = baseline.value(&path.observations[t * size], size, t);
-      const double delta = path.rewards[t] + settings.gamma * next - value;
-      advantages[t] = sum = delta + settings.gamma * settings.lambda * sum;
-      next = value;
+    const double last =
+        goes_on ? baseline.value(path.last_observation.data(), size, path.steps()) : 0;
+    std::vector<double> values(path.steps());
+    for (std::size_t t = 0; t < path.steps(); ++t) {
+      values[t] = baseline.value(&path.observations[t * size], size, t);
     }
-    all.insert(all.end(), advantages.begin(), advantages.end());
+    all.resize(all.size() + path.steps());
+    generalisedAdvantages(path.rewards.data(), values.data(), path.steps(), last, settings.gamma,
+                          settings.lambda, all.data() + all.size() - path.steps());
   }
   return all;
 }

@@ -6,8 +6,6 @@
 namespace pmeta {
 namespace {
 
-constexpr int kForgiven = 9;  // episodes that break down one after the other
-
 void append(std::vector<double>& to, const std::vector<double>& more) {
   to.insert(to.end(), more.begin(), more.end());
 }
@@ -101,7 +99,7 @@ ActionData RecordingActor::data(const AdvantageSettings& settings) const {
 }
 
 OnPolicySampler::OnPolicySampler(std::vector<std::unique_ptr<Env>> envs)
-    : rollout_(std::move(envs), Rollout::AtEnd::kStop, kForgiven) {}
+    : rollout_(std::move(envs), Rollout::AtEnd::kStop, BrokenEpisodes::kForgiven) {}
 
 ActionData OnPolicySampler::sample(const GaussianMlp& policy, double scale,
                                    const std::vector<double>& parameters,

@@ -85,15 +85,4 @@ PpoLoss ppo(const PpoSettings& settings, const PpoBatch& batch, const float* mea
   return loss;
 }
 
-void generalisedAdvantages(const float* rewards, const float* values, std::size_t steps,
-                           double gamma, double lambda, float* advantages) {
-  double next_value = 0, advantage = 0;
-  for (std::size_t t = steps; t-- > 0;) {
-    const double delta = rewards[t] + gamma * next_value - values[t];
-    advantage = delta + gamma * lambda * advantage;
-    advantages[t] = static_cast<float>(advantage);
-    next_value = values[t];
-  }
-}
-
 }  // namespace pmeta

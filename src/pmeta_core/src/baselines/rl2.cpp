@@ -112,8 +112,8 @@ void Rl2::valueAdvantages() {
     TrialTargets& targets = targets_[k];
     targets.advantages.resize(trial.steps);
     targets.returns.resize(trial.steps);
-    generalisedAdvantages(trial.rewards.data(), targets.values.data(), trial.steps, settings_.gamma,
-                          settings_.gae_lambda, targets.advantages.data());
+    generalisedAdvantages(trial.rewards.data(), targets.values.data(), trial.steps, 0.0,
+                          settings_.gamma, settings_.gae_lambda, targets.advantages.data());
     for (std::size_t t = 0; t < trial.steps; ++t) {
       targets.returns[t] = targets.advantages[t] + targets.values[t];
     }

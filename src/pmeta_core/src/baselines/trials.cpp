@@ -17,7 +17,7 @@ class TrialSampler::OneTask : private Actor {
   OneTask(std::vector<std::unique_ptr<Env>> envs, const Rl2Networks& networks, int episodes)
       : networks_(networks),
         episodes_(episodes),
-        rollout_(std::move(envs), Rollout::AtEnd::kStop, kForgiven) {}
+        rollout_(std::move(envs), Rollout::AtEnd::kStop, BrokenEpisodes::kForgiven) {}
 
   /// Returns the transitions made.
   std::int64_t play(const float* parameters, const std::vector<Trial*>& trials, Rng& rng) {

@@ -57,6 +57,8 @@ class Finder {
       }
       if (kind != "include") {
         assets_.insert(value);
+        // where paths are stripped, as of a URDF's package://robot/meshes/arm.stl
+        assets_.insert(fs::path(value).filename().string());
       } else if (add(folder_ / value)) {
         read((folder_ / value).lexically_normal());
       }

@@ -12,7 +12,7 @@ SacCollector::SacCollector(std::unique_ptr<Env> env, const SacNetworks& networks
       settings_(settings),
       source_(source),
       rollout_(makeEnvs([&](int) { return std::move(env); }, 1), Rollout::AtEnd::kBeginAnother,
-               kForgiven),
+               BrokenEpisodes::kForgiven),
       replay_(static_cast<std::size_t>(settings.buffer_size),
               static_cast<int>(networks.observationSize()),
               static_cast<int>(networks.actionSize())),

@@ -2,6 +2,7 @@
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/mjcf/terms.h"
@@ -109,6 +110,35 @@ class Keyframe : public StartTerm {
 };
 const RegisteredTerm<StartTerm, Keyframe> kKeyframe(
     "keyframe", "positions, velocities and controls of a keyframe of the model");
+
+class Hold : public StartTerm {
+ public:
+  void bind(TermSettings& settings) override {
+    settings.bind("actuators", actuators_, "position servos of the model, by name");
+  }
+  void find(const Elements& elements) override {
+    const mjModel* m = elements.model().get();
+    for (const int actuator : elements.all(Element::kActuator, "actuators", actuators_)) {
+      const int joint = m->actuator_trnid[2 * actuator];
+      const bool drives_one = m->actuator_trntype[actuator] == mjTRN_JOINT &&
+                              m->jnt_type[joint] != mjJNT_FREE && m->jnt_type[joint] != mjJNT_BALL;
+      if (!drives_one) {
+        elements.refuse("actuators", "holds " + shown(elements.name(Element::kActuator, actuator)) +
+                                         ", which drives no hinge or slide.");
+      }
+      servos_.emplace_back(actuator, m->jnt_qposadr[joint]);
+    }
+  }
+  void start(const mjModel*, mjData* data, Rng&) const override {
+    for (const auto& [actuator, position] : servos_) data->ctrl[actuator] = data->qpos[position];
+  }
+
+ private:
+  std::vector<std::string> actuators_ = {"all"};
+  std::vector<std::pair<int, int>> servos_;  // and where in the configuration its joint is
+};
+const RegisteredTerm<StartTerm, Hold> kHold(
+    "hold", "set points of position servos where their joints are, rad or m: give it last");
 
 }  // namespace
 }  // namespace pmeta

@@ -55,14 +55,27 @@ RobotScene::RobotScene(const pmeta::EnvFamily& family, int num_tasks,
   const auto env = family.make(0);
   if (env->model() == nullptr) throw pmeta::Error("a scene of robots needs a model of MuJoCo.");
   view_ = pmeta::viewOf(*env->model());
-  kinematics_ = std::make_unique<pmeta::MujocoKinematics>(*env->model());
+  readModels(num_tasks);
   step_seconds_ = env->spec().step_seconds;
-  rest_height_ = topOf(*kinematics_);
+  rest_height_ = topOf(*kinematics_.front());
   size_ = view_.width / (isPlanar() ? kUsualWidth : kUsualWidthFromAbove);
   spacing_ = std::pow(10, std::floor(std::log10(view_.width / kFewestLines)));
   const double height = isPlanar() ? (kFloorDepth + kAir) * size_ + rest_height_
                                    : view_.depth * std::sin(view_.elevation) + kLegRoom * size_;
   cards_ = layoutCards(num_tasks, family.numTasks(), 2, view_.width, height);
+}
+
+// links of tasks may differ in length
+void RobotScene::readModels(int num_tasks) {
+  std::vector<std::unique_ptr<pmeta::Env>> envs;  // all alive: an address stands for one model
+  std::map<const pmeta::MujocoModel*, std::shared_ptr<pmeta::MujocoKinematics>> known;
+  for (int task = 0; task < num_tasks; ++task) {
+    envs.push_back(family_.make(task));
+    const pmeta::MujocoModel* model = envs.back()->model();
+    auto& kinematics = known[model];
+    if (!kinematics) kinematics = std::make_shared<pmeta::MujocoKinematics>(*model);
+    kinematics_.push_back(kinematics);
+  }
 }
 
 std::vector<geometry_msgs::TransformStamped> RobotScene::frames() const {
@@ -87,13 +100,13 @@ std::vector<geometry_msgs::TransformStamped> RobotScene::frames() const {
 
 std::string RobotScene::problem(const Trajectory& trajectory) const {
   const std::size_t numbers =
-      (numSteps(trajectory) + 1) * static_cast<std::size_t>(kinematics_->nq());
-  if (trajectory.position_size != static_cast<std::uint32_t>(kinematics_->nq()) ||
+      (numSteps(trajectory) + 1) * static_cast<std::size_t>(kinematics_.front()->nq());
+  if (trajectory.position_size != static_cast<std::uint32_t>(kinematics_.front()->nq()) ||
       trajectory.positions.size() != numbers) {
     return "it has " + std::to_string(trajectory.positions.size()) + " positions of size " +
            std::to_string(trajectory.position_size) + " for " +
            std::to_string(numSteps(trajectory)) + " steps; the model's are of size " +
-           std::to_string(kinematics_->nq()) + ".";
+           std::to_string(kinematics_.front()->nq()) + ".";
   }
   const std::string problem = formProblem(trajectory, trajectory.observation_size);
   if (!problem.empty()) return problem;
@@ -113,9 +126,10 @@ const std::vector<Position>& RobotScene::pathOf(int task, int policy,
   if (path.episode == episode) return path.torso;
   path.episode = episode;
   path.torso.clear();
+  pmeta::MujocoKinematics& kinematics = *kinematics_.at(task);
   for (std::size_t step = 0; episode && step <= numSteps(*episode); ++step) {
-    kinematics_->pose(&episode->positions[step * episode->position_size]);
-    const double* at = kinematics_->bodyPosition(view_.body);
+    kinematics.pose(&episode->positions[step * episode->position_size]);
+    const double* at = kinematics.bodyPosition(view_.body);
     path.torso.push_back({at[0], at[1], at[2]});
   }
   return path.torso;
@@ -192,9 +206,10 @@ MarkerArray RobotScene::moving(const SceneContent& content, const std::vector<do
       drawFloor(moment, scene);
       scene.markers.push_back(drawPath(moment));
       if (moment.episode) {
-        kinematics_->pose(&moment.episode->positions[moment.step * moment.episode->position_size]);
+        kinematics_.at(task)->pose(
+            &moment.episode->positions[moment.step * moment.episode->position_size]);
       }
-      drawGeoms(*kinematics_, pictureOf(moment), scene);
+      drawGeoms(*kinematics_.at(task), pictureOf(moment), scene);
       const double y =
           isPlanar() ? -0.68 * kFloorDepth * unit()
                      : -0.5 * view_.depth * std::sin(view_.elevation) * scale() + 0.1 * unit();

@@ -56,6 +56,7 @@ class RobotScene : public Scene {
     std::string robot_frame;
   };
 
+  void readModels(int num_tasks);
   const std::vector<Position>& pathOf(int task, int policy,
                                       const pmeta_msgs::Trajectory::ConstPtr& episode);
   bool isPlanar() const { return view_.elevation == 0; }
@@ -71,7 +72,8 @@ class RobotScene : public Scene {
   const pmeta::EnvFamily& family_;
   std::vector<RobotTarget> targets_;
   pmeta::MujocoView view_;
-  std::unique_ptr<pmeta::MujocoKinematics> kinematics_;
+  /// Of each task; those of one model share it.
+  std::vector<std::shared_ptr<pmeta::MujocoKinematics>> kinematics_;
   double step_seconds_ = 0;
   double rest_height_ = 0;  // m, of the highest point at rest
   double size_ = 1;         // of the robot, in those of the usual ones

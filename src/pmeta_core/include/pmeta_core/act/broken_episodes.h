@@ -10,6 +10,9 @@ namespace pmeta {
 /// Counts the episodes whose simulation broke down, and gives up where one after the other does.
 class BrokenEpisodes {
  public:
+  /// So many running are forgiven where training data is collected.
+  static constexpr int kForgiven = 9;
+
   /// So many running are forgiven.
   explicit BrokenEpisodes(int forgiven) : forgiven_(forgiven) {}
 

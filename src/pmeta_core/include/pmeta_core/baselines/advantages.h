@@ -40,7 +40,16 @@ class LinearBaseline {
   std::vector<double> coefficients_;
 };
 
-/// How advantages are estimated (Schulman et al., "Generalized Advantage Estimation", 2016).
+/// Of the `steps` steps of one path (Schulman et al., "Generalized Advantage Estimation", 2016):
+///
+///     A_t = delta_t + gamma lambda A_{t+1},  delta_t = r_t + gamma V_{t+1} - V_t
+///
+/// `last_value`: V past the last step; 0 if the path ends with it. T: float or double.
+template <class T>
+void generalisedAdvantages(const T* rewards, const T* values, std::size_t steps, double last_value,
+                           double gamma, double lambda, T* advantages);
+
+/// How advantages are estimated.
 struct AdvantageSettings {
   double gamma = 0.99;  ///< discount
   double lambda = 1;    ///< of the exponentially weighted sum; 1: return minus baseline
@@ -49,8 +58,7 @@ struct AdvantageSettings {
   bool bootstrap = false;
 };
 
-/// delta_t = r_t + gamma b_{t+1} - b_t, and the sum of (gamma lambda)^j delta_{t+j} for each step
-/// of each path; paths one after the other.
+/// Generalised ones with the baseline as the value; paths one after the other.
 std::vector<double> advantages(const std::vector<Path>& paths, const LinearBaseline& baseline,
                                const AdvantageSettings& settings);
 

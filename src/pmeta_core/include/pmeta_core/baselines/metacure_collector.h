@@ -16,9 +16,6 @@ namespace pmeta {
 /// whole episodes. All of it becomes replay, what the explorer does also trials.
 class MetaCureCollector : private Actor {
  public:
-  /// Episodes running that may break down.
-  static constexpr int kForgiven = 9;
-
   /// `buffer_size`: of the replay. The networks must outlive the collector, as `parameters` must.
   MetaCureCollector(std::unique_ptr<Env> env, const MetaCureNetworks& networks,
                     const float* parameters, const MetaCureSettings& settings,

@@ -18,9 +18,6 @@ namespace pmeta {
 /// episodes, and keeps what comes of it in the task's replay and as its context.
 class PearlCollector : private Actor {
  public:
-  /// Episodes running that may break down.
-  static constexpr int kForgiven = 9;
-
   /// `buffer_size`: of the replay. The networks must outlive the collector.
   PearlCollector(std::unique_ptr<Env> env, const SacNetworks& networks, const SacSettings& settings,
                  std::size_t buffer_size);

@@ -62,10 +62,4 @@ struct PpoLoss {
 PpoLoss ppo(const PpoSettings& settings, const PpoBatch& batch, const float* means,
             const float* log_std, const float* values, const PpoGradients& gradients);
 
-/// Generalised advantages (Schulman et al., 2016) of one path that ends with its last step:
-///
-///     A_t = delta_t + gamma lambda A_{t+1},  delta_t = r_t + gamma V_{t+1} - V_t
-void generalisedAdvantages(const float* rewards, const float* values, std::size_t steps,
-                           double gamma, double lambda, float* advantages);
-
 }  // namespace pmeta

@@ -27,9 +27,6 @@ struct Trial {
 /// breaks down ends there; the trial goes on with the next one.
 class TrialSampler {
  public:
-  /// Episodes of one task running that may break down.
-  static constexpr int kForgiven = 9;
-
   /// Trials of `episodes` episodes each, up to `max_trials` at a time. The networks must outlive
   /// the sampler.
   TrialSampler(const MetaTasks& tasks, const Rl2Networks& networks, int episodes,

@@ -5,8 +5,8 @@
 
 namespace pmeta {
 
-/// The files that a MuJoCo model is read from: its MJCF, and all that it names (included files,
-/// meshes, textures, height fields, skins).
+/// The files that a MuJoCo model is read from: its MJCF or URDF, and all that it names (included
+/// files, meshes, textures, height fields, skins).
 struct ModelFiles {
   std::string folder;              ///< below which all of them are
   std::vector<std::string> names;  ///< in it; the MJCF comes first

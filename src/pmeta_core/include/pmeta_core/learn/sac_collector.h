@@ -17,9 +17,6 @@ namespace pmeta {
 /// comes of it in the replay; a TaskSource may tell the actor the task anew for each episode.
 class SacCollector : private Actor {
  public:
-  /// Episodes running that may break down.
-  static constexpr int kForgiven = 9;
-
   /// `task_input`: x of the actor, for good where `source` is nullptr. The networks and the source
   /// must outlive the collector.
   SacCollector(std::unique_ptr<Env> env, const SacNetworks& networks, const SacSettings& settings,
