@@ -244,7 +244,7 @@ def test_pages_have_commands_and_links_that_lead_somewhere():
 def test_pages_name_settings_that_exist():
     """Inline `key:=value` words are settings or launch arguments."""
     launch = (TOP / "launch/experiment.launch").read_text()
-    known = set(re.findall(r'<arg name="(\w+)"', launch)) | {"bag", "task", "config"}
+    known = set(re.findall(r'<arg name="(\w+)"', launch)) | {"bag", "task", "config", "run"}
     for config in (TOP / "config").glob("*.yaml"):
         if config.name == "convergence.yaml":
             continue

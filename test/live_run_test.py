@@ -145,7 +145,8 @@ def test_a_finished_run_is_shown_without_training(tmp_path):
             markers = run(["timeout", "20", "rostopic", "echo", "-n1", "/pmeta/markers"],
                           env=env).stdout
             return ("gridworld: round 3 of 3 (finished)" in markers
-                    and re.search(r"(?s)personal return -?\d.*meta return -?\d", markers))
+                    and re.search(r"mean personal return \(PP\) -?\d", markers)
+                    and re.search(r"mean meta return \(MP\) -?\d", markers))
 
         assert wait_until(shows_all), (tmp_path / "show.log").read_text()
         showing.terminate()  # killed, it would leave its nodes behind

@@ -68,7 +68,8 @@ def test_each_help_names_the_topics_and_services_that_there_are(tmp_path):
         wait_for(lambda: (folder / "policies/task_0.safetensors").exists())
         policy = subprocess.Popen(
             ["rosrun", "pmeta_nodes", "policy_node", "__ns:=/pmeta",
-             "_policy:=%s" % (folder / "policies/task_0.safetensors")],
+             # which finds out its task
+             "_policy:=%s" % (TOP / "config/policies/half_cheetah_dir/policies/meta.safetensors")],
             env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         for program, node in NODES.items():
             try:

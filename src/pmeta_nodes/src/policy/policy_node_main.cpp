@@ -22,10 +22,10 @@ private parameters
   ~explore     false: a meta-policy that could find out its task acts as before it has (default
                true)
   ~seed        of the draws of its exploration (default 0)
-subscribes   observation (std_msgs/Float64MultiArray): as many numbers as the environment's have
-             reward (std_msgs/Float64): of each action, where a meta-policy finds out its task; the
-             next action waits for it
-services     begin_episode (std_srvs/Trigger): an episode is over, and the next begins; there, too
+subscribes   observation (std_msgs/Float64MultiArray), reward (std_msgs/Float64)
+             an observation has as many numbers as the environment's; a reward is of each action,
+             where a meta-policy finds out its task: the next action waits for it
+offers       begin_episode (std_srvs/Trigger): an episode is over, and the next begins; there, too
 publishes    action (std_msgs/Float64MultiArray): the greedy action, one number if it is discrete;
              /diagnostics
 An observation of a wrong size, or that is not finite, gets a warning and no action.
