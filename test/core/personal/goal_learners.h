@@ -8,6 +8,7 @@
 
 #include "pmeta_core/adapt/latent_adaptation.h"
 #include "pmeta_core/adapt/model_adaptation.h"
+#include "pmeta_core/aggregate/mix.h"
 #include "pmeta_core/learn/sac.h"
 #include "pmeta_core/personal/personal_learner.h"
 
@@ -113,6 +114,29 @@ inline const SacLearner& sac(const PersonalLearner& learner) {
 
 inline void run(PersonalLearner& learner, int updates, Rng& rng) {
   for (int r = 0; r < updates; ++r) learner.update(rng);
+}
+
+/// A learner of each goal.
+inline std::vector<std::unique_ptr<PersonalLearner>> makeLearners(
+    const SacSettings& settings, const PersonalSettings& personal) {
+  std::vector<std::unique_ptr<PersonalLearner>> learners;
+  for (int task = 0; task < kTasks; ++task) {
+    learners.push_back(std::make_unique<PersonalLearner>(makeLearner(settings, task, personal)));
+  }
+  return learners;
+}
+
+/// A round of all of them, and the aggregation after it.
+inline void trainRound(const std::vector<std::unique_ptr<PersonalLearner>>& learners, Model& meta,
+                       int updates, std::uint64_t seed, std::uint64_t round) {
+  std::vector<Contribution> contributions;
+  for (std::size_t task = 0; task < learners.size(); ++task) {
+    learners[task]->beginRound(meta, false);
+    Rng rng(seed, task, Stream::kSample, round);
+    run(*learners[task], updates, rng);
+    contributions.push_back({&learners[task]->auxiliary(), 1.0});
+  }
+  mixInto(meta, contributions, 1);
 }
 
 }  // namespace pmeta::test

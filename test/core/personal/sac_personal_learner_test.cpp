@@ -268,12 +268,9 @@ TEST(SacPersonalLearner, RoundsGiveOneMetaPolicyForAllGoals) {
   settings.batch_size = 32;
   settings.warm_up_steps = 200;
   settings.gamma = 0.9;
-  std::vector<std::unique_ptr<PersonalLearner>> learners;
-  for (int task = 0; task < kTasks; ++task) {
-    PersonalSettings personal = pulled();
-    personal.learning_rate = 3e-3;
-    learners.push_back(std::make_unique<PersonalLearner>(makeLearner(settings, task, personal)));
-  }
+  PersonalSettings pull = pulled();
+  pull.learning_rate = 3e-3;
+  const auto learners = test::makeLearners(settings, pull);
   Model meta = learners[0]->initialModel(0);
   const auto meanReturn = [&](bool personal) {
     double sum = 0;
@@ -284,19 +281,8 @@ TEST(SacPersonalLearner, RoundsGiveOneMetaPolicyForAllGoals) {
     return sum;
   };
   const double untrained = meanReturn(false);
-  for (std::uint64_t round = 0; round < 30; ++round) {
-    std::vector<Contribution> contributions;
-    for (std::size_t task = 0; task < learners.size(); ++task) {
-      learners[task]->beginRound(meta, false);
-      Rng rng(0, task, Stream::kSample, round);
-      run(*learners[task], 50, rng);
-      contributions.push_back({&learners[task]->auxiliary(), 1.0});
-    }
-    if (round + 1 == 30) {
-      EXPECT_GT(meanReturn(true), 0.4 * untrained);
-    }
-    mixInto(meta, contributions, 1);
-  }
+  for (std::uint64_t round = 0; round < 30; ++round) test::trainRound(learners, meta, 50, 0, round);
+  EXPECT_GT(meanReturn(true), 0.4 * untrained);
   EXPECT_GT(meanReturn(false), 0.4 * untrained);
 }
 

@@ -7,17 +7,18 @@
 
 #include "../support.h"
 #include "goal_learners.h"
-#include "pmeta_core/aggregate/mix.h"
 
 namespace pmeta {
 namespace {
 
 using test::kTasks;
 using test::makeLearner;
+using test::makeLearners;
 using test::pulled;
 using test::run;
 using test::sac;
 using test::smallSac;
+using test::trainRound;
 
 SacSettings notExploring() {
   SacSettings settings = smallSac("model");
@@ -56,19 +57,9 @@ TEST(SacTaskModel, TasksBeginAlike) {
 
 // also of the model: what is sent of other tasks' columns counts for nothing
 TEST(SacTaskModel, AColumnIsItsTasksAlone) {
-  std::vector<std::unique_ptr<PersonalLearner>> learners;
-  for (int task = 0; task < kTasks; ++task) {
-    learners.push_back(std::make_unique<PersonalLearner>(makeLearner(smallSac("model"), task)));
-  }
+  const auto learners = makeLearners(smallSac("model"), pulled());
   Model meta = learners[0]->initialModel(1);
-  std::vector<Contribution> contributions;
-  for (std::size_t task = 0; task < learners.size(); ++task) {
-    learners[task]->beginRound(meta, false);
-    Rng rng(7, task, Stream::kSample);
-    run(*learners[task], 30, rng);
-    contributions.push_back({&learners[task]->auxiliary(), 1.0});
-  }
-  mixInto(meta, contributions, 1);
+  trainRound(learners, meta, 30, 7, 0);
   for (const std::size_t weights : sac(*learners[0]).networks().taskWeights()) {
     for (std::size_t task = 0; task < learners.size(); ++task) {
       EXPECT_EQ(meta.floats()[weights + task],
@@ -130,23 +121,11 @@ TEST(SacTaskModel, ExploringIsAsGoodAsBeingTold) {
   settings.gamma = 0.9;
   settings.task_encoding = "model";
   settings.task_model.hidden = {24, 24};
-  std::vector<std::unique_ptr<PersonalLearner>> learners;
-  for (int task = 0; task < kTasks; ++task) {
-    PersonalSettings personal = pulled();
-    personal.learning_rate = 3e-3;
-    learners.push_back(std::make_unique<PersonalLearner>(makeLearner(settings, task, personal)));
-  }
+  PersonalSettings personal = pulled();
+  personal.learning_rate = 3e-3;
+  const auto learners = makeLearners(settings, personal);
   Model meta = learners[0]->initialModel(0);
-  for (std::uint64_t round = 0; round < 40; ++round) {
-    std::vector<Contribution> contributions;
-    for (std::size_t task = 0; task < learners.size(); ++task) {
-      learners[task]->beginRound(meta, false);
-      Rng rng(0, task, Stream::kSample, round);
-      run(*learners[task], 50, rng);
-      contributions.push_back({&learners[task]->auxiliary(), 1.0});
-    }
-    mixInto(meta, contributions, 1);
-  }
+  for (std::uint64_t round = 0; round < 40; ++round) trainRound(learners, meta, 50, 0, round);
   double before = 0, after = 0;
   for (int task = 0; task < kTasks; ++task) {
     const PersonalLearner& learner = *learners[static_cast<std::size_t>(task)];

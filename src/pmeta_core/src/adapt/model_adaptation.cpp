@@ -31,8 +31,7 @@ ModelAdaptation::ModelAdaptation(const SacNetworks& networks, const SacSettings&
 
 void ModelAdaptation::guess(Rng& rng) {
   guess_ = posterior_.draw(rng);
-  std::fill(acting_.taskInput().begin(), acting_.taskInput().end(), 0.0f);
-  acting_.taskInput()[guess_] = 1;
+  acting_.taskInput() = oneHot(static_cast<int>(guess_), static_cast<int>(posterior_.tasks()));
 }
 
 bool ModelAdaptation::refuted() const {

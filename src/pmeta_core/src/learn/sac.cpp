@@ -114,16 +114,18 @@ UpdateStats SacLearner::learn(const Model& parameters, const AnyOptimizer& optim
   stats.broken_episodes = brokenEpisodes() - broken_before;
   Optimizer<float>& steps = *std::get<Optimizer<float>*>(optimizer);
   const SacLosses losses = update(values, steps, rng);
-  report(losses, updateModel(values, steps, rng.branch(Stream::kTaskModel)));
+  report(losses, updateModel(values, steps, rng));
   stats.loss = losses.critic;
   stats.updates = 1;
   return stats;
 }
 
-double SacLearner::updateModel(const float* parameters, Optimizer<float>& optimizer, Rng rng) {
+double SacLearner::updateModel(const float* parameters, Optimizer<float>& optimizer,
+                               const Rng& rng) {
   if (!modelled_) return 0;
+  Rng rows = rng.branch(Stream::kTaskModel);
   const std::size_t offset = networks().taskModelOffset();
-  return model_update_->apply(parameters + offset, *modelled_, offset, optimizer, rng);
+  return model_update_->apply(parameters + offset, *modelled_, offset, optimizer, rows);
 }
 
 std::vector<float> SacLearner::taskInput(const Model& policy) const {

@@ -16,41 +16,24 @@ Registry<TermRow<RewardTerm>>& RewardTerm::registry() {
 
 namespace {
 
-/// How fast the origin of a body's frame moved along a direction, on average over the step.
-class BodyVelocity : public RewardTerm {
+/// A quantity of one body.
+class OfBody : public RewardTerm {
  public:
-  void bind(TermSettings& settings) override {
-    settings.bind("body", body_, "whose");
-    settings.bind("axis", axis_, "of the world, along which", {"x", "y", "z"});
-    settings.bind("heading", heading_, "angle by which x and y are turned about z, rad");
-  }
+  void bind(TermSettings& settings) override { settings.bind("body", body_, "whose"); }
   void find(const Elements& elements) override {
     index_ = elements.one(Element::kBody, "body", body_);
-    const double c = std::cos(heading_);
-    const double s = std::sin(heading_);
-    const double directions[3][3] = {{c, s, 0}, {-s, c, 0}, {0, 0, 1}};
-    mju_copy3(direction_, directions[axis_[0] - 'x']);
   }
-  int memory() const override { return 3; }
-  void remember(const Robot& robot, double* memory) const override {
-    mju_copy3(memory, robot.data->xpos + 3 * index_);
-  }
-  double value(const Robot& robot, const double* memory) const override {
-    const double* now = robot.data->xpos + 3 * index_;
-    double speed = 0;
-    for (int i = 0; i < 3; ++i) speed += (now[i] - memory[i]) / robot.dt * direction_[i];
-    return speed;
-  }
+
+ protected:
+  int index() const { return index_; }  ///< the model's, of that body
 
  private:
   std::string body_;
-  std::string axis_ = "x";
-  double heading_ = 0;
   int index_ = 0;
-  double direction_[3] = {1, 0, 0};
 };
 
-class JointVelocity : public RewardTerm {
+/// A quantity of one joint.
+class OfJoint : public RewardTerm {
  public:
   void bind(TermSettings& settings) override {
     settings.bind("joint", joint_, "whose; root.x is a number of a free joint");
@@ -58,17 +41,54 @@ class JointVelocity : public RewardTerm {
   void find(const Elements& elements) override {
     index_ = elements.position("joint", joint_).index;
   }
-  int memory() const override { return 1; }
-  void remember(const Robot& robot, double* memory) const override {
-    *memory = robot.data->qpos[index_];
-  }
-  double value(const Robot& robot, const double* memory) const override {
-    return (robot.data->qpos[index_] - *memory) / robot.dt;
-  }
+
+ protected:
+  double position(const Robot& robot) const { return robot.data->qpos[index_]; }  ///< rad or m
 
  private:
   std::string joint_;
   int index_ = 0;
+};
+
+/// How fast the origin of a body's frame moved along a direction, on average over the step.
+class BodyVelocity : public OfBody {
+ public:
+  void bind(TermSettings& settings) override {
+    OfBody::bind(settings);
+    settings.bind("axis", axis_, "of the world, along which", {"x", "y", "z"});
+    settings.bind("heading", heading_, "angle by which x and y are turned about z, rad");
+  }
+  void find(const Elements& elements) override {
+    OfBody::find(elements);
+    const double c = std::cos(heading_);
+    const double s = std::sin(heading_);
+    const double directions[3][3] = {{c, s, 0}, {-s, c, 0}, {0, 0, 1}};
+    mju_copy3(direction_, directions[axis_[0] - 'x']);
+  }
+  int memory() const override { return 3; }
+  void remember(const Robot& robot, double* memory) const override {
+    mju_copy3(memory, robot.data->xpos + 3 * index());
+  }
+  double value(const Robot& robot, const double* memory) const override {
+    const double* now = robot.data->xpos + 3 * index();
+    double speed = 0;
+    for (int i = 0; i < 3; ++i) speed += (now[i] - memory[i]) / robot.dt * direction_[i];
+    return speed;
+  }
+
+ private:
+  std::string axis_ = "x";
+  double heading_ = 0;
+  double direction_[3] = {1, 0, 0};
+};
+
+class JointVelocity : public OfJoint {
+ public:
+  int memory() const override { return 1; }
+  void remember(const Robot& robot, double* memory) const override { *memory = position(robot); }
+  double value(const Robot& robot, const double* memory) const override {
+    return (position(robot) - *memory) / robot.dt;
+  }
 };
 
 /// How far `Measured` is from what it should be.
@@ -97,59 +117,29 @@ const RegisteredTerm<RewardTerm, ErrorOf<JointVelocity>> kJointVelocityError(
     "joint_velocity_error",
     "distance of that from a target, rad/s or m/s: give it a weight below 0");
 
-class JointPositionError : public RewardTerm {
+class JointPosition : public OfJoint {
  public:
-  void bind(TermSettings& settings) override {
-    settings.bind("joint", joint_, "whose; root.x is a number of a free joint");
-    settings.bind("target", target_, "where it should be, rad or m");
-  }
-  void find(const Elements& elements) override {
-    index_ = elements.position("joint", joint_).index;
-  }
-  double value(const Robot& robot, const double*) const override {
-    return std::abs(robot.data->qpos[index_] - target_);
-  }
-
- private:
-  std::string joint_;
-  double target_ = 0;
-  int index_ = 0;
+  double value(const Robot& robot, const double*) const override { return position(robot); }
 };
-const RegisteredTerm<RewardTerm, JointPositionError> kJointPositionError(
+const RegisteredTerm<RewardTerm, ErrorOf<JointPosition>> kJointPositionError(
     "joint_position_error",
     "distance of a joint from a target, rad or m: give it a weight below 0");
 
-class Height : public RewardTerm {
+class Height : public OfBody {
  public:
-  void bind(TermSettings& settings) override { settings.bind("body", body_, "whose"); }
-  void find(const Elements& elements) override {
-    index_ = elements.one(Element::kBody, "body", body_);
-  }
   double value(const Robot& robot, const double*) const override {
-    return robot.data->xpos[3 * index_ + 2];
+    return robot.data->xpos[3 * index() + 2];
   }
-
- private:
-  std::string body_;
-  int index_ = 0;
 };
 const RegisteredTerm<RewardTerm, Height> kHeight("height", "of a body's frame, m");
 const RegisteredTerm<RewardTerm, ErrorOf<Height>> kHeightError(
     "height_error", "distance of that from a target, m: give it a weight below 0");
 
-class Upright : public RewardTerm {
+class Upright : public OfBody {
  public:
-  void bind(TermSettings& settings) override { settings.bind("body", body_, "whose"); }
-  void find(const Elements& elements) override {
-    index_ = elements.one(Element::kBody, "body", body_);
-  }
   double value(const Robot& robot, const double*) const override {
-    return robot.data->xmat[9 * index_ + 8];
+    return robot.data->xmat[9 * index() + 8];
   }
-
- private:
-  std::string body_;
-  int index_ = 0;
 };
 const RegisteredTerm<RewardTerm, Upright> kUpright(
     "upright", "cosine of the angle from up to a body's z axis: 1 upright, -1 head down");

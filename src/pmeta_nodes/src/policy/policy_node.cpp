@@ -63,6 +63,7 @@ void PolicyNode::onReward(const std_msgs::Float64::ConstPtr& msg) {
 bool PolicyNode::onBeginEpisode(std_srvs::Trigger::Request&,
                                 std_srvs::Trigger::Response& response) {
   awaits_ = false;
+  forgetOutcome();
   policy_.beginEpisode();
   response.success = 1;
   response.message = doing();
@@ -73,13 +74,17 @@ bool PolicyNode::onBeginEpisode(std_srvs::Trigger::Request&,
 // once both parts of what came of the last action are there
 void PolicyNode::goOn() {
   if (!reward_ || !next_observation_) return;
+  const double reward = *reward_;
   const std::vector<double> observation = *next_observation_;
-  if (!policy_.observe(*reward_, observation.data())) {
-    refuse("an observation and its reward, which are not finite.");
-  } else {
+  forgetOutcome();
+  if (policy_.observe(reward, observation.data())) {
     answer(observation);
-    return;
+  } else {
+    refuse("an observation and its reward, which are not finite.");
   }
+}
+
+void PolicyNode::forgetOutcome() {
   reward_.reset();
   next_observation_.reset();
 }
@@ -92,8 +97,6 @@ void PolicyNode::answer(const std::vector<double>& observation) {
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   awaits_ = policy_.observes();
-  reward_.reset();
-  next_observation_.reset();
   action_pub_.publish(action_);
   ++answered_;
   seconds_ += seconds.count();

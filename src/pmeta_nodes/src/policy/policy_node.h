@@ -41,6 +41,7 @@ class PolicyNode {
   bool onBeginEpisode(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   void answer(const std::vector<double>& observation);
   void goOn();
+  void forgetOutcome();
   void refuse(const std::string& what);
   std::string doing() const;
   HealthReport health() const;

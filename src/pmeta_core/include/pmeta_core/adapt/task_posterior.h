@@ -12,9 +12,12 @@ namespace pmeta {
 /// Which task transitions are of, by Bayes' rule through a TaskModel. A hypothesis z is refuted by
 /// how badly it predicts what happened, summed over transitions, in whose order it does not matter:
 ///
-///     E(z) = sum over transitions, outputs k of (f_k(x, z) - outcome_k)^2 / (2 max(e^v_k,
-///     least_variance)) w_j  ~ exp(-kappa E(e_j))     on the tasks trained on, e_j; the prior is
-///     uniform
+///     E(z) = sum over transitions and outputs k of
+///                (f_k(x, z) - outcome_k)^2 / (2 max(e^v_k, least_variance))
+///
+///     w_j  ~ exp(-kappa E(e_j))
+///
+/// on the tasks trained on, e_j; the prior is uniform.
 class TaskPosterior {
  public:
   /// Of no transition. `parameters` are the model's; they and the model must outlive this.

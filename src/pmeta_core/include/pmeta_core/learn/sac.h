@@ -79,7 +79,7 @@ class SacLearner : public Learner {
 
  private:
   std::unique_ptr<TaskSource> makeSource(const std::vector<float>& task_input);
-  double updateModel(const float* parameters, Optimizer<float>& optimizer, Rng rng);
+  double updateModel(const float* parameters, Optimizer<float>& optimizer, const Rng& rng);
   void report(const SacLosses& losses, double model_loss);
 
   SacSettings settings_;
