@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <string>
+
 #include "baselines/opposite_goals.h"
 #include "memory_state.h"
 #include "support.h"
@@ -34,6 +37,20 @@ TEST(PooledSac, ToldItsTaskItReachesOppositeGoals) {
   PooledSac learner(test::oppositeGoals(), smallPooled("one_hot"));
   train(learner, 40);
   EXPECT_GT(test::evaluateOnGoals(learner, {}).worse(0), -7);
+}
+
+TEST(PooledSac, WithAHeadForEachTaskToo) {
+  PooledSac learner(test::oppositeGoals(), smallPooled("multi_head"));
+  train(learner, 40);
+  EXPECT_GT(test::evaluateOnGoals(learner, {}).worse(0), -7);
+}
+
+TEST(PooledSac, EachTaskHasALastLayerOfItsOwn) {
+  const PooledSac learner(test::oppositeGoals(), smallPooled("multi_head"));
+  std::map<std::string, std::size_t> rows;
+  for (const Block& block : learner.model().layout.blocks()) rows[block.name] = block.shape[0];
+  EXPECT_EQ(rows["actor.layer2.weight"], 2u * 4);  // mean and log_std of two numbers of an action
+  EXPECT_EQ(rows["critic2.layer2.weight"], 2u * 1);
 }
 
 TEST(PooledSac, NotToldItCannot) {

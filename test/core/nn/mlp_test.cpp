@@ -51,15 +51,25 @@ std::vector<double> linear(const Mlp& mlp, const std::vector<double>& parameters
 
 // one sample in double, by the blocks' names
 std::vector<double> reference(const Mlp& mlp, const std::vector<double>& parameters,
-                              std::vector<double> x) {
+                              const std::vector<double>& input) {
   const MlpSpec& spec = mlp.spec();
+  std::vector<double> x = input;
   std::size_t l = 0;
   for (; l < spec.hidden.size(); ++l) {
     x = linear(mlp, parameters, "layer" + std::to_string(l), x, spec.hidden[l]);
     const bool relu = spec.activation == Activation::kRelu;
     for (double& unit : x) unit = relu ? std::max(unit, 0.0) : std::tanh(unit);
   }
-  if (!spec.dueling) return linear(mlp, parameters, "layer" + std::to_string(l), x, spec.outputs);
+  if (!spec.dueling) {
+    const std::string last = "layer" + std::to_string(l);
+    const auto heads = linear(mlp, parameters, last, x, spec.heads * spec.outputs);
+    if (spec.heads == 1) return heads;
+    std::vector<double> sum(spec.outputs);
+    for (std::size_t k = 0; k < heads.size(); ++k) {
+      sum[k % spec.outputs] += input[spec.head_input + k / spec.outputs] * heads[k];
+    }
+    return sum;
+  }
   const double value = linear(mlp, parameters, "value", x, 1)[0];
   std::vector<double> q = linear(mlp, parameters, "advantage", x, spec.outputs);
   double mean = 0;
@@ -104,7 +114,9 @@ INSTANTIATE_TEST_SUITE_P(
                       Shape{{"q", 3, {}, 2}, 4}, Shape{{"q", 3, {}, 2, true}, 1},
                       Shape{{"critic1", 7, {20}, 1}, 12}, Shape{{"pi", 6, {9, 8, 11}, 10}, 5},
                       Shape{{"pi", 6, {9}, 4, true}, 1},
-                      Shape{{"pi", 6, {9, 12}, 4, false, false, Activation::kTanh}, 5}),
+                      Shape{{"pi", 6, {9, 12}, 4, false, false, Activation::kTanh}, 5},
+                      Shape{{"pi", 6, {9}, 4, false, false, Activation::kRelu, 3, 2}, 5},
+                      Shape{{"q", 5, {}, 1, false, false, Activation::kRelu, 2, 0}, 3}),
     [](const auto& test) { return "Number" + std::to_string(test.index); });
 
 TEST_P(MlpOf, ForwardAgreesWithDoubleOnEveryInstructionSet) {
@@ -268,6 +280,25 @@ TEST(Mlp, BlocksAreNamedAsInPyTorch) {
             "q.advantage.weight 2 8\nq.value.bias 1\nq.advantage.bias 2\n");
   EXPECT_EQ(plain.size(), 8u * 4 + 8 + 6 * 8 + 6 + 2 * 6 + 2);
   EXPECT_EQ(dueling.size(), 8u * 4 + 8 + 3 * 8 + 3);
+}
+
+TEST(Mlp, AOneHotVectorChoosesItsHead) {
+  const Mlp three({"pi", 5, {8}, 2, false, false, Activation::kRelu, 3, 1});
+  const Mlp one({"pi", 5, {8}, 2});
+  const auto parameters = initialised(three, 1);
+  const std::vector<float> input = {0.3f, 0, 1, 0, -0.7f};
+  MlpWorkspace of_three(three, 1), of_one(one, 1);
+  const float* y = three.forward(parameters.data(), input.data(), 1, of_three);
+  // the hidden layer, then the weights and the biases of head 1
+  std::vector<float> chosen(parameters.begin(), parameters.begin() + 8 * 5 + 8);
+  const auto append = [&](std::size_t begin, std::size_t count) {
+    const auto from = parameters.begin() + static_cast<std::ptrdiff_t>(begin);
+    chosen.insert(chosen.end(), from, from + static_cast<std::ptrdiff_t>(count));
+  };
+  append(48 + 2 * 8, 2 * 8);
+  append(48 + 6 * 8 + 2, 2);
+  const float* expected = one.forward(chosen.data(), input.data(), 1, of_one);
+  for (std::size_t o = 0; o < 2; ++o) EXPECT_FLOAT_EQ(y[o], expected[o]);
 }
 
 TEST(Mlp, InitialisesUniformlyWithinTorchsBounds) {

@@ -16,12 +16,8 @@ GruSpec recurrent(const EnvSpec& env, const MetaCureSettings& settings) {
 }
 
 MlpSpec head(const MetaCureSettings& settings) {
-  MlpSpec spec;
-  spec.prefix = "encoder_head";
-  spec.inputs = static_cast<std::size_t>(settings.recurrent_units);
-  spec.outputs = 2 * static_cast<std::size_t>(settings.latent_size);
-  spec.portable = settings.sac.portable;
-  return spec;
+  return mlpSpec("encoder_head", static_cast<std::size_t>(settings.recurrent_units), {},
+                 2 * static_cast<std::size_t>(settings.latent_size), settings.sac.portable);
 }
 
 float variance(float raw) {

@@ -11,13 +11,10 @@ namespace {
 
 MlpSpec predictor(const char* prefix, const EnvSpec& env, int task_inputs,
                   const MetaCureSettings& settings) {
-  MlpSpec spec;
-  spec.prefix = prefix;
-  spec.inputs = static_cast<std::size_t>(task_inputs + env.observation_size + env.action_size);
-  spec.hidden.assign(settings.sac.hidden.begin(), settings.sac.hidden.end());
-  spec.outputs = static_cast<std::size_t>(1 + (settings.predicts_next ? env.observation_size : 0));
-  spec.portable = settings.sac.portable;
-  return spec;
+  const int inputs = task_inputs + env.observation_size + env.action_size;
+  const int outputs = 1 + (settings.predicts_next ? env.observation_size : 0);
+  return mlpSpec(prefix, static_cast<std::size_t>(inputs), settings.sac.hidden,
+                 static_cast<std::size_t>(outputs), settings.sac.portable);
 }
 
 std::size_t batchOf(const MetaCureSettings& settings) {

@@ -10,10 +10,8 @@
 namespace pmeta {
 namespace {
 
-const char* const kOneHot = "one_hot";
-
 std::vector<float> inputOf(int task, int num_tasks, const SacSettings& settings) {
-  return settings.task_encoding == kOneHot ? oneHot(task, num_tasks) : std::vector<float>();
+  return settings.isTold() ? oneHot(task, num_tasks) : std::vector<float>();
 }
 
 // a batch's rows tell their tasks themselves
@@ -37,8 +35,9 @@ PooledSacSettings::PooledSacSettings() {
 void bind(Settings& s, const std::string& prefix, PooledSacSettings& p) {
   const Range positive = Range::between(1, 1e9);
   s.bind(prefix + "task_encoding", p.sac.task_encoding,
-         "what tells the networks the task: one_hot, or none: one policy for all",
-         {kOneHot, "none"});
+         "what tells the networks the task: one_hot; multi_head, by which each task has a last "
+         "layer of its own, too; or none: one policy for all",
+         {"one_hot", "multi_head", "none"});
   s.bind(prefix + "hidden", p.sac.hidden, "units of each hidden layer of actor and critics",
          Range::between(1, 65536));
   s.bind(prefix + "batch_size", p.sac.batch_size,
@@ -163,7 +162,7 @@ class PooledSacKind : public MetaLearnerKind {
   void setPortable(bool portable) override { settings_.sac.portable = portable; }
   std::vector<int> explorationEpisodes() const override { return {}; }
   int evaluationEpisodes() const override { return settings_.sac.evaluation_episodes; }
-  bool servesTestTasks() const override { return !isTold(); }
+  bool servesTestTasks() const override { return !settings_.sac.isTold(); }
   std::unique_ptr<MetaLearner> make(const MetaTasks& tasks) const override {
     return std::make_unique<PooledSac>(tasks, settings_);
   }
@@ -171,13 +170,11 @@ class PooledSacKind : public MetaLearnerKind {
     return std::make_unique<SacPolicies>(env.spec(), settings_.sac, num_tasks);
   }
   std::optional<std::vector<float>> metaInput(int task, int num_tasks) const override {
-    if (isTold() && (task < 0 || task >= num_tasks)) return std::nullopt;
+    if (settings_.sac.isTold() && (task < 0 || task >= num_tasks)) return std::nullopt;
     return inputOf(task, num_tasks, settings_.sac);
   }
 
  private:
-  bool isTold() const { return settings_.sac.task_encoding == kOneHot; }
-
   PooledSacSettings settings_;
 };
 

@@ -16,12 +16,8 @@ const EnvSpec& requireContinuous(const EnvSpec& env) {
 }
 
 MlpSpec head(const char* prefix, const Rl2Settings& settings, std::size_t outputs) {
-  MlpSpec spec;
-  spec.prefix = prefix;
-  spec.inputs = static_cast<std::size_t>(settings.hidden);
-  spec.hidden.assign(settings.head.begin(), settings.head.end());
-  spec.outputs = outputs;
-  spec.portable = settings.portable;
+  MlpSpec spec = mlpSpec(prefix, static_cast<std::size_t>(settings.hidden), settings.head, outputs,
+                         settings.portable);
   spec.activation = Activation::kTanh;
   return spec;
 }

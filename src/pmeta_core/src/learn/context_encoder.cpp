@@ -18,13 +18,8 @@ double sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
 double factorVariance(double x) { return std::max(softplus(x), kLeastVariance); }
 
 MlpSpec encoderNetwork(std::size_t inputs, const ContextSettings& settings) {
-  MlpSpec spec;
-  spec.prefix = "encoder";
-  spec.inputs = inputs;
-  spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
-  spec.outputs = 2 * static_cast<std::size_t>(settings.latent_size);
-  spec.portable = settings.portable;
-  return spec;
+  return mlpSpec("encoder", inputs, settings.hidden,
+                 2 * static_cast<std::size_t>(settings.latent_size), settings.portable);
 }
 
 }  // namespace

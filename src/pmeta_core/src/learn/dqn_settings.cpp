@@ -8,13 +8,9 @@ MlpSpec dqnNetwork(const EnvSpec& env, const DqnSettings& settings) {
   if (env.num_actions < 1) {
     throw Error("environment '" + env.name + "' has continuous actions: DQN needs discrete ones.");
   }
-  MlpSpec spec;
-  spec.prefix = "q";
-  spec.inputs = static_cast<std::size_t>(env.observation_size);
-  spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
-  spec.outputs = static_cast<std::size_t>(env.num_actions);
+  MlpSpec spec = mlpSpec("q", static_cast<std::size_t>(env.observation_size), settings.hidden,
+                         static_cast<std::size_t>(env.num_actions), settings.portable);
   spec.dueling = settings.dueling;
-  spec.portable = settings.portable;
   return spec;
 }
 

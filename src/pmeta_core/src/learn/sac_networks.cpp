@@ -30,12 +30,14 @@ const EnvSpec& requireContinuous(const EnvSpec& env) {
 
 MlpSpec network(const char* name, const SacSettings& settings, std::size_t inputs,
                 std::size_t outputs) {
-  MlpSpec spec;
-  spec.prefix = settings.prefix + name;
-  spec.inputs = inputs;
-  spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
-  spec.outputs = outputs;
-  spec.portable = settings.portable;
+  return mlpSpec(settings.prefix + name, inputs, settings.hidden, outputs, settings.portable);
+}
+
+// of the actor and the critics, all of which have the task input after the observation
+MlpSpec withHeads(MlpSpec spec, const EnvSpec& env, const SacSettings& settings, int num_tasks) {
+  if (!settings.hasHeads()) return spec;
+  spec.heads = static_cast<std::size_t>(num_tasks);
+  spec.head_input = static_cast<std::size_t>(env.observation_size);
   return spec;
 }
 
@@ -70,10 +72,13 @@ SacNetworks::SacNetworks(const EnvSpec& env, const SacSettings& settings, int nu
       task_input_size_(taskInputs(settings, num_tasks)),
       min_log_std_(static_cast<float>(settings.min_log_std)),
       as_rlkit_(settings.initialisation == "rlkit"),
-      actor_(network("actor", settings, observation_size_ + task_input_size_, 2 * action_size_)),
-      critic1_(
-          network("critic1", settings, observation_size_ + task_input_size_ + action_size_, 1)),
-      critic2_(network("critic2", settings, critic1_.inputs(), 1)) {
+      actor_(withHeads(
+          network("actor", settings, observation_size_ + task_input_size_, 2 * action_size_), env,
+          settings, num_tasks)),
+      critic1_(withHeads(network("critic1", settings, actor_.inputs() + action_size_, 1), env,
+                         settings, num_tasks)),
+      critic2_(
+          withHeads(network("critic2", settings, critic1_.inputs(), 1), env, settings, num_tasks)) {
   if (settings.backbone == "value") {
     value_.emplace(network("value", settings, actor_.inputs(), 1));
   }

@@ -13,13 +13,9 @@ float symlog(float x) { return std::copysign(std::log1p(std::abs(x)), x); }
 
 MlpSpec modelNetwork(std::size_t observation_size, std::size_t action_size, std::size_t task_inputs,
                      const TaskModelSettings& settings, bool portable) {
-  MlpSpec spec;
-  spec.prefix = "task_model";
-  spec.inputs = observation_size * (settings.dynamics ? 1 : 2) + action_size + task_inputs;
-  spec.hidden.assign(settings.hidden.begin(), settings.hidden.end());
-  spec.outputs = 1 + (settings.dynamics ? observation_size : 0);
-  spec.portable = portable;
-  return spec;
+  const std::size_t inputs = observation_size * (settings.dynamics ? 1 : 2) + action_size;
+  return mlpSpec("task_model", inputs + task_inputs, settings.hidden,
+                 1 + (settings.dynamics ? observation_size : 0), portable);
 }
 
 }  // namespace

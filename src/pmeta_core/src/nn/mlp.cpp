@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/nn/kernels.h"
@@ -34,7 +35,38 @@ void splitHeads(const float* d_q, std::size_t batch, std::size_t outputs, float*
   }
 }
 
+// the weighted sum of a row's heads
+void mixHeads(const float* heads, const float* weights, std::size_t batch, std::size_t count,
+              std::size_t outputs, float* mixed) {
+  std::fill_n(mixed, batch * outputs, 0.0f);
+  for (std::size_t b = 0; b < batch; ++b, mixed += outputs) {
+    for (std::size_t k = 0; k < count; ++k, heads += outputs) {
+      const float weight = weights[b * count + k];
+      for (std::size_t o = 0; o < outputs; ++o) mixed[o] += weight * heads[o];
+    }
+  }
+}
+
+// each head's share of the gradient by their sum
+void shareGradient(const float* d_mixed, const float* weights, std::size_t count,
+                   std::size_t outputs, float* d_heads) {
+  for (std::size_t k = 0; k < count; ++k, d_heads += outputs) {
+    for (std::size_t o = 0; o < outputs; ++o) d_heads[o] = weights[k] * d_mixed[o];
+  }
+}
+
 }  // namespace
+
+MlpSpec mlpSpec(std::string prefix, std::size_t inputs, const std::vector<int>& hidden,
+                std::size_t outputs, bool portable) {
+  MlpSpec spec;
+  spec.prefix = std::move(prefix);
+  spec.inputs = inputs;
+  spec.hidden.assign(hidden.begin(), hidden.end());
+  spec.outputs = outputs;
+  spec.portable = portable;
+  return spec;
+}
 
 MlpWorkspace::MlpWorkspace(const Mlp& mlp, std::size_t max_batch) : max_batch_(max_batch) {
   if (max_batch == 0) throw Error("a network's workspace needs room for at least one sample.");
@@ -43,7 +75,8 @@ MlpWorkspace::MlpWorkspace(const Mlp& mlp, std::size_t max_batch) : max_batch_(m
     activations_.emplace_back(max_batch * layer.outputs);
     widest = std::max(widest, layer.outputs);
   }
-  if (mlp.spec_.dueling) outputs_.resize(max_batch * mlp.spec_.outputs);
+  if (mlp.spec_.dueling || mlp.spec_.heads > 1) outputs_.resize(max_batch * mlp.spec_.outputs);
+  if (mlp.spec_.heads > 1) head_weights_.resize(max_batch * mlp.spec_.heads);
   delta_.resize(max_batch * widest);
   next_delta_.resize(max_batch * widest);
 }
@@ -55,6 +88,11 @@ Mlp::Mlp(MlpSpec spec) : spec_(std::move(spec)), product_(spec_.portable ? &gemm
                 "' needs at least one input, one output and one unit in each hidden layer.");
   }
   if (spec_.prefix.empty()) throw Error("a network needs a prefix for its blocks' names.");
+  const bool weighed = spec_.head_input + spec_.heads <= spec_.inputs && !spec_.dueling;
+  if (spec_.heads == 0 || (spec_.heads > 1 && !weighed)) {
+    throw Error("the network '" + spec_.prefix + "' cannot have " + std::to_string(spec_.heads) +
+                " heads: each needs an input that weighs it, and none of them is dueling.");
+  }
 
   const auto addBlock = [&](const std::string& name, std::vector<std::size_t> shape) {
     blocks_.push_back({spec_.prefix + "." + name, std::move(shape)});
@@ -70,7 +108,7 @@ Mlp::Mlp(MlpSpec spec) : spec_(std::move(spec)), product_(spec_.portable ? &gemm
   };
   for (const std::size_t units : spec_.hidden) addLayer(units);
   if (!spec_.dueling) {
-    addLayer(spec_.outputs);
+    addLayer(spec_.heads * spec_.outputs);
     return;
   }
   // both heads' weights lie together, so that one product serves them
@@ -117,9 +155,25 @@ const float* Mlp::forward(const float* parameters, const float* input, std::size
     if (hidden && !relu) kernel.hyperbolicTangent(y, batch * layer.outputs);
     x = y;
   }
-  if (!spec_.dueling) return x;
-  combineHeads(x, batch, spec_.outputs, workspace.outputs_.data());
-  return workspace.outputs_.data();
+  return combine(input, batch, workspace);
+}
+
+const float* Mlp::combine(const float* input, std::size_t batch, MlpWorkspace& workspace) const {
+  const float* last = workspace.activations_.back().data();
+  float* outputs = workspace.outputs_.data();
+  if (spec_.dueling) {
+    combineHeads(last, batch, spec_.outputs, outputs);
+  } else if (spec_.heads > 1) {
+    float* weights = workspace.head_weights_.data();
+    for (std::size_t b = 0; b < batch; ++b) {
+      std::copy_n(input + b * spec_.inputs + spec_.head_input, spec_.heads,
+                  weights + b * spec_.heads);
+    }
+    mixHeads(last, weights, batch, spec_.heads, spec_.outputs, outputs);
+  } else {
+    return last;
+  }
+  return outputs;
 }
 
 void Mlp::backward(const float* parameters, const float* input, std::size_t batch,
@@ -158,11 +212,7 @@ void Mlp::backwardThrough(const float* parameters, const float* input, std::size
   const Kernels& kernel = kernels();
   const auto throughActivation =
       spec_.activation == Activation::kRelu ? kernel.maskRelu : kernel.scaleByTanhSlope;
-  const float* delta = d_output;
-  if (spec_.dueling) {
-    splitHeads(d_output, batch, spec_.outputs, workspace.delta_.data());
-    delta = workspace.delta_.data();
-  }
+  const float* delta = split(d_output, batch, rows, workspace);
   float* next = workspace.next_delta_.data();
   for (std::size_t l = layers_.size(); l-- > 0;) {
     const Layer& layer = layers_[l];
@@ -178,6 +228,7 @@ void Mlp::backwardThrough(const float* parameters, const float* input, std::size
       if (d_input == nullptr) return;
       product_(Transpose::kNo, Transpose::kNo, batch, count, out, 1, delta, out, weight + first, in,
                0, d_input, count);
+      if (spec_.heads > 1) addWeighing(d_output, batch, rows, first, count, d_input, workspace);
       return;
     }
     product_(Transpose::kNo, Transpose::kNo, batch, in, out, 1, delta, out, weight, in, 0, next,
@@ -191,6 +242,41 @@ void Mlp::backwardThrough(const float* parameters, const float* input, std::size
     delta = next;
     next = next == workspace.next_delta_.data() ? workspace.delta_.data()
                                                 : workspace.next_delta_.data();
+  }
+}
+
+const float* Mlp::split(const float* d_output, std::size_t batch, const std::size_t* rows,
+                        MlpWorkspace& workspace) const {
+  float* delta = workspace.delta_.data();
+  if (spec_.dueling) {
+    splitHeads(d_output, batch, spec_.outputs, delta);
+  } else if (spec_.heads > 1) {
+    for (std::size_t b = 0; b < batch; ++b) {
+      const std::size_t row = rows == nullptr ? b : rows[b];
+      shareGradient(d_output + b * spec_.outputs, &workspace.head_weights_[row * spec_.heads],
+                    spec_.heads, spec_.outputs, delta + b * spec_.heads * spec_.outputs);
+    }
+  } else {
+    return d_output;
+  }
+  return delta;
+}
+
+// by the inputs that weigh heads: what each head puts out, times the gradient by their sum
+void Mlp::addWeighing(const float* d_output, std::size_t batch, const std::size_t* rows,
+                      std::size_t first, std::size_t count, float* d_input,
+                      const MlpWorkspace& workspace) const {
+  const std::size_t begin = std::max(first, spec_.head_input);
+  const std::size_t end = std::min(first + count, spec_.head_input + spec_.heads);
+  for (std::size_t b = 0; b < batch; ++b) {
+    const std::size_t row = rows == nullptr ? b : rows[b];
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t head = row * spec_.heads + i - spec_.head_input;
+      const float* output = &workspace.activations_.back()[head * spec_.outputs];
+      for (std::size_t o = 0; o < spec_.outputs; ++o) {
+        d_input[b * count + i - first] += d_output[b * spec_.outputs + o] * output[o];
+      }
+    }
   }
 }
 

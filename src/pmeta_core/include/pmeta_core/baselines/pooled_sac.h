@@ -28,8 +28,9 @@ void bind(Settings& settings, const std::string& prefix, PooledSacSettings& pool
 
 /// Multi-task soft actor-critic: one actor and critics for all tasks, trained on batches of which
 /// each task's replay gives an equal part. With task_encoding "one_hot" the networks are told the
-/// task, and what sharing trajectories is worth shows; with "none" they are not, and what one
-/// policy for all comes to.
+/// task, and what sharing trajectories is worth shows; with "multi_head" each task has a last layer
+/// of its own as well, of all networks; with "none" they are not told, and what one policy for all
+/// comes to shows.
 class PooledSac : public MetaLearner {
  public:
   /// Throws Error if actions are discrete, or a batch has no row for each task.

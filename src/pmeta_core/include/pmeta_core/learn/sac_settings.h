@@ -24,8 +24,9 @@ struct SacSettings {
   TemperatureSettings temperature;       ///< weight of the entropy
   /// What tells the networks the task besides the observation: "one_hot" (the task's number),
   /// "model" (the same, and a model that is learnt of the tasks finds it out at test time),
-  /// "inference" (a latent vector that the context encoder infers), "none", or, for learners that
-  /// make the input themselves, "given".
+  /// "inference" (a latent vector that the context encoder infers), "none", or, of learners of all
+  /// tasks, "multi_head" (the number, which also chooses among last layers, one for each task) and
+  /// "given" (an input that the learner makes itself).
   std::string task_encoding = "one_hot";
   ContextSettings context;       ///< with task_encoding "inference"; exploration with "model", too
   TaskModelSettings task_model;  ///< with task_encoding "model"
@@ -53,9 +54,10 @@ struct SacSettings {
   bool own_column = true;
 
   /// While training, the networks are told the task's number.
-  bool isTold() const { return task_encoding == "one_hot" || models(); }
-  bool infers() const { return task_encoding == "inference"; }  ///< with the context encoder
-  bool models() const { return task_encoding == "model"; }      ///< with a TaskModel
+  bool isTold() const { return task_encoding == "one_hot" || models() || hasHeads(); }
+  bool infers() const { return task_encoding == "inference"; }     ///< with the context encoder
+  bool hasHeads() const { return task_encoding == "multi_head"; }  ///< a last layer for each task
+  bool models() const { return task_encoding == "model"; }         ///< with a TaskModel
 };
 
 /// Binds all of them below `prefix`, e.g. "sac.".

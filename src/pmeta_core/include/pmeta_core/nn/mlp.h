@@ -23,7 +23,16 @@ struct MlpSpec {
   bool dueling = false;             ///< two heads, Q = V + A - mean A (Wang et al., 2016, eq. 9)
   bool portable = false;            ///< products by gemmEigen: the same bits on every processor
   Activation activation = Activation::kRelu;  ///< of hidden layers
+  /// Last layers; not with `dueling`. With several, the output is the sum of theirs, weighted by
+  /// the inputs [head_input, head_input + heads), which are inputs of the first layer as well: a
+  /// one-hot vector there chooses.
+  std::size_t heads = 1;
+  std::size_t head_input = 0;
 };
+
+/// Of a network with ReLU and `hidden` as settings have it: units of each hidden layer.
+MlpSpec mlpSpec(std::string prefix, std::size_t inputs, const std::vector<int>& hidden,
+                std::size_t outputs, bool portable);
 
 class Mlp;
 
@@ -42,7 +51,8 @@ class MlpWorkspace {
 
   std::size_t max_batch_;
   std::vector<AlignedFloats> activations_;  // output of each layer, the last one linear
-  AlignedFloats outputs_;                   // heads combined, if dueling
+  AlignedFloats outputs_;                   // heads combined, if there are several
+  AlignedFloats head_weights_;              // of the last forward pass, if the input weighs them
   AlignedFloats delta_, next_delta_;        // gradients by a layer's output
 };
 
@@ -51,11 +61,12 @@ class MlpWorkspace {
 /// Matrices are row-major with one sample a row: an input is [batch, inputs]. Weights lie as in
 /// PyTorch, [out, in], and so are named: "q.layer0.weight", "q.layer0.bias", ... A dueling network
 /// ends in "q.value.weight" [1, h], "q.advantage.weight" [outputs, h], "q.value.bias" and
-/// "q.advantage.bias" in the place of its last layer. Parameters need no alignment, but 64 bytes
-/// (AlignedFloats) are faster.
+/// "q.advantage.bias" in the place of its last layer; of several heads that layer's rows are head
+/// 0's, then head 1's, and so on. Parameters need no alignment, but 64 bytes (AlignedFloats) are
+/// faster.
 class Mlp {
  public:
-  /// Throws Error unless every size is positive and the prefix a name.
+  /// Throws Error unless every size is positive, the prefix a name and the heads' weights inputs.
   explicit Mlp(MlpSpec spec);
 
   const MlpSpec& spec() const { return spec_; }          ///< as given to the constructor
@@ -108,6 +119,12 @@ class Mlp {
                        const float* d_output, float* gradient, std::size_t first, std::size_t count,
                        const std::size_t* rows, float* d_input, MlpWorkspace& workspace) const;
   void requireInputs(std::size_t first, std::size_t count) const;
+  const float* combine(const float* input, std::size_t batch, MlpWorkspace& workspace) const;
+  const float* split(const float* d_output, std::size_t batch, const std::size_t* rows,
+                     MlpWorkspace& workspace) const;
+  void addWeighing(const float* d_output, std::size_t batch, const std::size_t* rows,
+                   std::size_t first, std::size_t count, float* d_input,
+                   const MlpWorkspace& workspace) const;
 
   MlpSpec spec_;
   decltype(&gemm) product_;
