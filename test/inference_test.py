@@ -1,5 +1,6 @@
 """The table of how well meta-policies find out their tasks."""
 
+import json
 import statistics
 
 import pytest
@@ -47,6 +48,26 @@ def test_each_seed_has_its_last_and_its_late_returns(explored):
                 100 * min(of[-2:]) / statistics.mean(of[-2:]), abs=0.51)
     means = [statistics.mean(numbers(line[1])[0] for line in lines[:2])]
     assert numbers(lines[2][1])[0] == pytest.approx(means[0], abs=0.11)
+
+
+def test_test_tasks_that_are_trained_on_are_called_so(explored):
+    top, folders = explored
+    for folder in folders:
+        edit(folder, "manifest.json", with_descriptions(["left", "right", "left"]))
+    group = only_group(top)
+    assert pi.inference_cells(group)[0][4] == "MP after 2, test tasks, trained on"
+    assert group[0].runs[0].test_names == ["left, trained on"]
+    edit(folders[0], "manifest.json", with_descriptions(["left", "right", "up"]))
+    assert only_group(top)[0].runs[0].test_names == ["up"]
+
+
+def with_descriptions(words):
+    def edited(text):
+        manifest = json.loads(text)
+        manifest["tasks"] = [{"task": i, "split": "test" if i == 2 else "train", "description": word}
+                             for i, word in enumerate(words)]
+        return json.dumps(manifest)
+    return edited
 
 
 def test_tasks_are_counted_where_rewards_are_sparse(explored):

@@ -218,7 +218,7 @@ def test_test_tasks_have_columns_and_a_figure(tmp_path):
     assert by_policy["MP", "last"][2] == spread([fresh_mean(f, "last", "meta", split="test")
                                                  for f in folders])
     text = Page(path).text
-    assert "test task 2: zeta 4" in text and "which nobody trained on, before and after" in text
+    assert "test task 2: zeta 4" in text and "on test tasks, before and after" in text
     assert len(found["images"]) == 3 and found["overflow"] <= 0
 
 

@@ -75,8 +75,8 @@ CAPTIONS = (
     ("comparison", "All methods beside ours on training tasks; dotted: the mean of the last tenth "
      "of the evaluations."),
     ("tasks_last", "Returns task by task; a task that is stuck shows, which a mean hides."),
-    ("_unseen_tasks", "The meta-policy on training tasks and on test tasks, which nobody trained "
-     "on, before and after adaptation from exploration episodes, as far as there are any."),
+    ("_unseen_tasks", "The meta-policy on training tasks and on test tasks, before and after "
+     "adaptation from exploration episodes, as far as there are any."),
     ("trajectories", "One episode of each policy on each task: of personal policies on their own, of "
      "meta-policies after so many exploration episodes. Full lines end within the goal's radius."),
     ("value_maps", "What each policy takes a state to be worth (colour), and greedy episodes from "

@@ -25,7 +25,8 @@ def columns_of(run):
     after = adaptations(run.returns, "train")
     columns = {"PP": "personal"}
     columns.update({"MP after %d" % n: ("train", n) for n in after})
-    columns.update({"MP after %d, unseen" % n: ("test", n)
+    word = "unseen" if run.unseen else "test tasks, trained on"
+    columns.update({"MP after %d, %s" % (n, word): ("test", n)
                     for n in adaptations(run.returns, "test") if n > 0})
     return columns
 

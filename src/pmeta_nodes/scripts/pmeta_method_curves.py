@@ -47,11 +47,12 @@ def draw_unseen_methods(experiments, figures):
             steps_axis(axis, methods)
             for method in methods:
                 draw_method(axis, method, pm.after(method.group, "test", number), "MP", number)
-            axis.set_title(title_of(experiment, number), loc="left")
+            trained = not any(run.unseen for m in methods for run in m.group.runs)
+            axis.set_title(title_of(experiment, number) + "\ntrained on, too" * trained, loc="left")
         low, high = zip(*(axis.get_ylim() for axis in grid_of[:, column]))
         for axis in grid_of[:, column]:
             axis.set_ylim(min(low), max(high))
-    finish(figure, list(grid_of.flat), grid_of[0, -1], found, "test tasks, which nobody trained on")
+    finish(figure, list(grid_of.flat), grid_of[0, -1], found, "test tasks")
     figures.save(figure, "comparison_unseen")
 
 

@@ -88,7 +88,11 @@ class Run:
         self.num_tasks = 1 + max(task for by_task in steps.values() for task in by_task)
         self.num_tests = self._count_tests(path)
         self.task_names = _task_names(manifest, self.num_tasks)
-        self.test_names = _task_names(manifest, self.num_tasks + self.num_tests)[self.num_tasks:]
+        trained_on = _trained_on(manifest)
+        tests = _task_names(manifest, self.num_tasks + self.num_tests)[self.num_tasks:]
+        self.test_names = [name + (", trained on" if task in trained_on else "")
+                           for task, name in enumerate(tests, self.num_tasks)]
+        self.unseen = not trained_on.issuperset(self.tasks_of("meta_test"))
         path = os.path.join(folder, "final.csv")
         self.fresh = (read_fresh(path, self.num_tasks, self.num_tests) if os.path.isfile(path)
                       else {})
@@ -203,6 +207,15 @@ def _task_names(manifest, count):
         differ = [i for i in range(len(parts[0])) if len(set(p[i] for p in parts)) > 1]
         parts = [[p[i] for i in differ] for p in parts]
     return [", ".join(p) or "task %d" % task for task, p in enumerate(parts)]
+
+
+def _trained_on(manifest):
+    """Numbers of the test tasks that are training tasks once more, going by their descriptions."""
+    tasks = manifest.get("tasks")
+    told = [(task.get("task"), task.get("split"), task.get("description"))
+            for task in (tasks if isinstance(tasks, list) else []) if isinstance(task, dict)]
+    trained = set(str(what) for _, split, what in told if split == "train" and what)
+    return set(task for task, split, what in told if split == "test" and str(what) in trained)
 
 
 def _required(folder, manifest, key, kind):
