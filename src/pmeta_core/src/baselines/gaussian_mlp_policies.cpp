@@ -50,7 +50,7 @@ GaussianMlpPolicies::GaussianMlpPolicies(const EnvSpec& env, const std::vector<i
 
 PolicyForm GaussianMlpPolicies::form() const {
   const std::string scaling = scale_ == 1 ? "" : "divided by " + formatNumber(scale_) + ", ";
-  return {"tanh", "none", "none", scaling + "clipped to [-1, 1]"};
+  return {"tanh", "none", "policy", "none", scaling + "clipped to [-1, 1]"};
 }
 
 void GaussianMlpPolicies::initialise(Model& parameters, Rng& rng) const {

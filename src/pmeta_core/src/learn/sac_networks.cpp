@@ -151,6 +151,11 @@ SacPolicies::SacPolicies(const EnvSpec& env, const SacSettings& settings, int nu
           ModelLayout(Precision::kFloat32, SacNetworks(env, settings, num_tasks).blocks())),
       networks_(env, settings, num_tasks) {}
 
+PolicyForm SacPolicies::form() const {
+  const MlpSpec& actor = networks_.actor().spec();
+  return {"relu", "tanh", actor.prefix, "none", "none", actor.heads};
+}
+
 void SacPolicies::initialise(Model& parameters, Rng& rng) const {
   networks_.initialise(parameters.floats().data(), rng);
 }

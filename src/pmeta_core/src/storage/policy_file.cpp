@@ -314,6 +314,8 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment, 
       {"input_scaling", form.input_scaling},
       {"output_scaling", form.output_scaling},
       {"settings", experiment.runYaml()}};
+  if (!form.network.empty()) metadata["network"] = form.network;
+  if (form.heads > 1) metadata["heads"] = std::to_string(form.heads);
   if (!spec.choices.empty()) metadata["choices"] = Json(spec.choices).dump();
   if (spec.step_seconds > 0) metadata["step_seconds"] = formatNumber(spec.step_seconds);
   if (const ModelChoice* model = experiment.model()) {

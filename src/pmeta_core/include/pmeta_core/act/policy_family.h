@@ -14,8 +14,11 @@ namespace pmeta {
 struct PolicyForm {
   std::string hidden_activation;        ///< of hidden layers: "relu"; "none" for a table
   std::string output_squashing;         ///< "tanh": outputs lie in (-1, 1), or "none"
+  std::string network;                  ///< first part of the acting network's blocks' names; empty
+                                        ///< where that is not layers alone
   std::string input_scaling = "none";   ///< of observations, before the first layer
   std::string output_scaling = "none";  ///< of actions, after the squashing
+  std::size_t heads = 1;                ///< see MlpSpec
 };
 
 /// All policies of one form: what their parameters are, and how they act.

@@ -38,7 +38,7 @@ class QPolicies : public PolicyFamily {
   const Mlp& network() const { return network_; }
 
   /// ReLU between layers; outputs are values as they are.
-  PolicyForm form() const override { return {"relu", "none"}; }
+  PolicyForm form() const override { return {"relu", "none", network_.spec().prefix}; }
   std::size_t taskInputSize() const override { return 0; }
   void initialise(Model& parameters, Rng& rng) const override;
   std::unique_ptr<Actor> actor(const Model& parameters, std::vector<float> task_input,

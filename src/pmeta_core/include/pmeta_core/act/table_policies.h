@@ -19,7 +19,7 @@ class TablePolicies : public PolicyFamily {
   TablePolicies(const TabularEnv& env, double initial_value);
 
   /// A table: no layers, no squashing.
-  PolicyForm form() const override { return {"none", "none"}; }
+  PolicyForm form() const override { return {"none", "none", ""}; }
   std::size_t taskInputSize() const override { return 0; }
   void initialise(Model& parameters, Rng& rng) const override;
   /// Knows no action in a state whose values are not present, or that is none.

@@ -48,7 +48,9 @@ class MetaCurePolicies : public PolicyFamily {
   /// What the parameters are of.
   const MetaCureNetworks& networks() const { return networks_; }
 
-  PolicyForm form() const override { return {"relu", "tanh"}; }
+  PolicyForm form() const override {
+    return {"relu", "tanh", networks_.exploiter().actor().spec().prefix};
+  }
   std::size_t taskInputSize() const override { return networks_.exploiter().taskInputSize(); }
   void initialise(Model& parameters, Rng& rng) const override;
   std::unique_ptr<Actor> actor(const Model& parameters, std::vector<float> task_input,

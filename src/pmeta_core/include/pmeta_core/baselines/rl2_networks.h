@@ -68,7 +68,7 @@ class Rl2Policies : public PolicyFamily {
   /// What the parameters are of.
   const Rl2Networks& networks() const { return networks_; }
 
-  PolicyForm form() const override { return {"tanh", "none"}; }
+  PolicyForm form() const override { return {"tanh", "none", ""}; }
   std::size_t taskInputSize() const override { return 0; }
   void initialise(Model& parameters, Rng& rng) const override;
   std::unique_ptr<Actor> actor(const Model& parameters, std::vector<float> task_input,

@@ -88,7 +88,7 @@ class SacPolicies : public PolicyFamily {
   const SacNetworks& networks() const { return networks_; }
 
   /// ReLU between layers; means squashed by tanh.
-  PolicyForm form() const override { return {"relu", "tanh"}; }
+  PolicyForm form() const override;
   std::size_t taskInputSize() const override { return networks_.taskInputSize(); }
   void initialise(Model& parameters, Rng& rng) const override;
   std::unique_ptr<Actor> actor(const Model& parameters, std::vector<float> task_input,
