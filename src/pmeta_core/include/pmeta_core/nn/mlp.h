@@ -27,7 +27,7 @@ struct MlpSpec {
   /// the inputs [head_input, head_input + heads), which are inputs of the first layer as well: a
   /// one-hot vector there chooses.
   std::size_t heads = 1;
-  std::size_t head_input = 0;
+  std::size_t head_input = 0;  ///< see heads
 };
 
 /// Of a network with ReLU and `hidden` as settings have it: units of each hidden layer.
