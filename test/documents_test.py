@@ -25,7 +25,7 @@ LONG = (r"\./pmeta (test|fuzz|chaos|bench|build|setup|results|coverage|lint)\b",
         r"\./pmeta run .*netns")
 
 # ends when somebody ends it
-ENDLESS = (r"policy_node", r"agent\.launch", r"replay_bag\.launch", r"\./pmeta show", r"show\.launch",
+ENDLESS = (r"policy_node", r"drive_robot", r"agent\.launch", r"replay_bag\.launch", r"\./pmeta show", r"show\.launch",
            r"rviz:=true", r"hold:=true")
 
 # asks a run that goes on

@@ -11,7 +11,7 @@ from programs import TOP, environment, run
 COMMON = {"/rosout", "get_loggers", "set_logger_level"}
 NODES = {"meta_aggregator": "/pmeta/meta_aggregator", "task_agent": "/pmeta/task_agent_0",
          "run_guard": "/pmeta/run_guard", "trajectory_view": "/pmeta/trajectory_view",
-         "policy_node": "/pmeta/policy_node"}
+         "policy_node": "/pmeta/policy_node", "drive_robot": "/pmeta/drive_robot"}
 
 
 def told(text):
@@ -62,21 +62,22 @@ def test_each_help_names_the_topics_and_services_that_there_are(tmp_path):
          "gridworld.launch", "rounds:=1", "hold:=true", "view:=true", "view_prefix:=env",
          "results_dir:=%s" % tmp_path, "run_id:=r"],
         env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    policy = None
+    policies = []
     try:
         master = xmlrpc.client.ServerProxy(env["ROS_MASTER_URI"])
         wait_for(lambda: (folder / "policies/task_0.safetensors").exists())
-        policy = subprocess.Popen(
-            ["rosrun", "pmeta_nodes", "policy_node", "__ns:=/pmeta",
-             # which finds out its task
-             "_policy:=%s" % (TOP / "config/policies/half_cheetah_dir/policies/meta.safetensors")],
+        # a policy which finds out its task
+        policies = [subprocess.Popen(
+            ["rosrun", "pmeta_nodes", program, "__ns:=/pmeta", "_policy:=%s" % (
+                TOP / "config/policies/half_cheetah_dir/policies/meta.safetensors")],
             env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            for program in ("policy_node", "drive_robot")]
         for program, node in NODES.items():
             try:
                 wait_for(lambda: done_by(master, node) == helps[program], 20)
             except AssertionError:
                 assert done_by(master, node) == helps[program], program
     finally:
-        for process in filter(None, (policy, launch)):
+        for process in policies + [launch]:
             process.terminate()
             process.wait(60)

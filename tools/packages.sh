@@ -15,11 +15,11 @@ PACKAGES_FUZZ_NOETIC=(clang)
 PACKAGES_PEERS=(python3-torch libopenblas0-pthread)
 PACKAGES_ROS_DEBIAN=(ros-base rosbash rviz catkin
   ros-message-generation ros-message-runtime libroscpp-dev librosconsole-dev
-  libstd-msgs-dev ros-std-msgs libgeometry-msgs-dev ros-geometry-msgs
+  libstd-msgs-dev ros-std-msgs libsensor-msgs-dev ros-sensor-msgs libgeometry-msgs-dev ros-geometry-msgs
   libvisualization-msgs-dev ros-visualization-msgs libdiagnostic-msgs-dev ros-diagnostic-msgs
   libdiagnostic-updater-dev libtf2-ros-dev libstd-srvs-dev ros-std-srvs
   librviz-dev pluginlib-dev qtbase5-dev
-  python3-std-msgs python3-std-srvs python3-geometry-msgs python3-visualization-msgs python3-diagnostic-msgs python3-tf2-msgs
+  python3-std-msgs python3-sensor-msgs python3-std-srvs python3-geometry-msgs python3-visualization-msgs python3-diagnostic-msgs python3-tf2-msgs
   python3-rosbag librostest-dev python3-rostest libtopic-tools-dev)
 PACKAGES_ROS_NOETIC=(ros-noetic-ros-base ros-noetic-rviz ros-noetic-rosbash ros-noetic-rostest
   ros-noetic-diagnostic-updater ros-noetic-tf2-ros ros-noetic-visualization-msgs ros-noetic-std-srvs ros-noetic-pluginlib

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 
+#include <map>
 #include <string>
+#include <vector>
 
 #include "pmeta_core/base/error.h"
 
@@ -43,6 +45,22 @@ TEST_F(PrivateParam, IsWhatItIsSetToOrElseTheDefault) {
   EXPECT_EQ(privatePositive("value", 2.5, 100), 5) << "a whole number is a number";
   set(0.5);
   EXPECT_EQ(privatePositive("value", 2.5, 100), 0.5);
+}
+
+TEST_F(PrivateParam, MayBeAListOrHaveNames) {
+  EXPECT_TRUE(privateNames("value").empty());
+  EXPECT_TRUE(privateNumbers("value").empty());
+  set(std::vector<std::string>{"elbow", "wrist"});
+  EXPECT_EQ(privateNames("value"), (std::vector<std::string>{"elbow", "wrist"}));
+  EXPECT_NE(errorOf([] { privateNumbers("value"); }), "(no error)");
+  set(std::map<std::string, double>{{"elbow", 0.5}, {"wrist", -1}});
+  EXPECT_EQ(privateNumbers("value"),
+            (std::map<std::string, double>{{"elbow", 0.5}, {"wrist", -1}}));
+  EXPECT_NE(errorOf([] { privateNames("value"); }), "(no error)");
+  set(std::vector<double>{1, 2});
+  EXPECT_EQ(errorOf([] { privateNames("value"); }),
+            "the private parameter value is '{1,2}' but must be a list of names, e.g. [elbow, "
+            "wrist]: give _value:=VALUE.");
 }
 
 TEST_F(PrivateParam, OfAnotherTypeOrOutOfItsRangeIsRefused) {

@@ -32,6 +32,12 @@ std::optional<XmlRpcValue> get(const std::string& name) {
                      " but must be " + must + ": give _" + name + ":=VALUE.");
 }
 
+std::optional<double> numberOf(XmlRpcValue& value) {
+  if (value.getType() == XmlRpcValue::TypeInt) return static_cast<int&>(value);
+  if (value.getType() == XmlRpcValue::TypeDouble) return static_cast<double&>(value);
+  return std::nullopt;
+}
+
 }  // namespace
 
 bool privateFlag(const std::string& name, bool otherwise) {
@@ -48,6 +54,33 @@ std::string privateText(const std::string& name, const std::string& otherwise) {
   return static_cast<std::string&>(*value);
 }
 
+std::vector<std::string> privateNames(const std::string& name) {
+  auto value = get(name);
+  std::vector<std::string> names;
+  if (!value) return names;
+  const char* const kMust = "a list of names, e.g. [elbow, wrist]";
+  if (value->getType() != XmlRpcValue::TypeArray) refuse(name, *value, kMust);
+  for (int k = 0; k < value->size(); ++k) {
+    if ((*value)[k].getType() != XmlRpcValue::TypeString) refuse(name, *value, kMust);
+    names.push_back(static_cast<std::string&>((*value)[k]));
+  }
+  return names;
+}
+
+std::map<std::string, double> privateNumbers(const std::string& name) {
+  auto value = get(name);
+  std::map<std::string, double> numbers;
+  if (!value) return numbers;
+  const char* const kMust = "a number for each name, e.g. {elbow: 0.5}";
+  if (value->getType() != XmlRpcValue::TypeStruct) refuse(name, *value, kMust);
+  for (auto& [key, one] : *value) {
+    const std::optional<double> number = numberOf(one);
+    if (!number) refuse(name, *value, kMust);
+    numbers[key] = *number;
+  }
+  return numbers;
+}
+
 int privateIndex(const std::string& name, int otherwise, int most) {
   auto value = get(name);
   if (!value) return otherwise;
@@ -61,9 +94,7 @@ int privateIndex(const std::string& name, int otherwise, int most) {
 double privatePositive(const std::string& name, double otherwise, double most) {
   auto value = get(name);
   if (!value) return otherwise;
-  double number = 0;
-  if (value->getType() == XmlRpcValue::TypeInt) number = static_cast<int&>(*value);
-  if (value->getType() == XmlRpcValue::TypeDouble) number = static_cast<double&>(*value);
+  const double number = numberOf(*value).value_or(0);
   if (number > 0 && number <= most) return number;
   refuse(name, *value, "a number above 0, at most " + pmeta::significant(most, 6));
 }

@@ -1,5 +1,6 @@
 #include "common/run_node.h"
 
+#include <ros/callback_queue.h>
 #include <ros/master.h>
 
 #include <csignal>
@@ -19,7 +20,29 @@ namespace {
 
 std::unique_ptr<MasterWatch> g_master;
 
-constexpr double kAskAgain = 0.2;  // seconds between two attempts at the master
+constexpr double kAskAgain = 0.2;      // seconds between two attempts at the master
+constexpr double kLookForStop = 0.05;  // seconds
+
+bool answersHelp(int argc, char** argv, const std::string& help) {
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--help") != 0 && std::strcmp(argv[i], "-h") != 0) continue;
+    std::cout << help;
+    return true;
+  }
+  return false;
+}
+
+// the exit code; an exception becomes one sentence
+int orSentence(const std::function<int()>& body) {
+  int code = 1;
+  try {
+    code = body();
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+  }
+  ros::shutdown();
+  return code;
+}
 
 }  // namespace
 
@@ -33,22 +56,27 @@ void initNode(int argc, char** argv, const std::string& name, std::uint32_t opti
   while (!ros::master::check()) ros::WallDuration(kAskAgain).sleep();
 }
 
+int runPlainNode(int argc, char** argv, const std::string& name, const std::string& help,
+                 const std::function<int()>& body) {
+  pmeta::prepareProcess();
+  if (answersHelp(argc, argv, help)) return 0;
+  initNode(argc, argv, name);
+  std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
+  // outside the try: the console falls silent when the last node handle goes
+  const ros::NodeHandle nh;
+  return orSentence(body);
+}
+
 int runNode(int argc, char** argv, const std::string& name, const std::string& help,
             const std::function<int(const pmeta::Experiment&)>& body) {
   pmeta::prepareProcess();
-  for (int i = 1; i < argc; ++i) {
-    if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
-      std::cout << help;
-      return 0;
-    }
-  }
+  if (answersHelp(argc, argv, help)) return 0;
   boundFreeMemory();
   initNode(argc, argv, name, ros::init_options::NoSigintHandler);
-  // outside the try: the console falls silent when the last node handle goes
   const ros::NodeHandle nh;
   // our own handlers: the last words of a run are published before ROS goes down
   pmeta::heedStopSignals();
-  try {
+  return orSentence([&] {
     const pmeta::Experiment experiment = readExperiment(nh);
     g_master = std::make_unique<MasterWatch>();
     int code = body(experiment);
@@ -59,17 +87,18 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
       code = 1;
     }
     g_master.reset();
-    ros::shutdown();
     return code;
-  } catch (const std::exception& error) {
-    ROS_FATAL("%s", error.what());
-    ros::shutdown();
-    return 1;
-  }
+  });
 }
 
 bool stopRequested() {
   return pmeta::stopSignalled() || !ros::ok() || (g_master && !g_master->trouble().empty());
+}
+
+void spinUntilStopped() {
+  while (!stopRequested()) {
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(kLookForStop));
+  }
 }
 
 pmeta::Experiment readExperiment(const ros::NodeHandle& nh) {

@@ -1,12 +1,8 @@
-#include <csignal>
 #include <cstdint>
-#include <cstring>
-#include <iostream>
 
 #include "common/private_param.h"
 #include "common/run_node.h"
 #include "pmeta_core/base/error.h"
-#include "pmeta_core/base/process.h"
 #include "policy/policy_node.h"
 
 namespace {
@@ -34,9 +30,7 @@ An observation of a wrong size, or that is not finite, gets a warning and no act
 constexpr int kMostTasks = 1000000;  // whose policy it is decides how many there are
 constexpr int kMostSeeds = 2147483647;
 
-void onSignal(int) { ros::requestShutdown(); }
-
-void act() {
+int act() {
   const std::string path = pmeta_nodes::privateText("policy", "");
   if (path.empty()) {
     throw pmeta::Error(
@@ -47,28 +41,12 @@ void act() {
       path, pmeta_nodes::privateIndex("task", -1, kMostTasks),
       pmeta_nodes::privateFlag("explore", true),
       static_cast<std::uint64_t>(pmeta_nodes::privateIndex("seed", 0, kMostSeeds)));
-  ros::spin();
+  pmeta_nodes::spinUntilStopped();
+  return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  pmeta::prepareProcess();
-  for (int i = 1; i < argc; ++i) {
-    if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
-      std::cout << kHelp;
-      return 0;
-    }
-  }
-  pmeta_nodes::initNode(argc, argv, "policy_node");
-  std::signal(SIGTERM, onSignal);
-  // outside the try: the console falls silent when the last node handle goes
-  const ros::NodeHandle nh;
-  try {
-    act();
-    return 0;
-  } catch (const std::exception& error) {
-    ROS_FATAL("%s", error.what());
-    return 1;
-  }
+  return pmeta_nodes::runPlainNode(argc, argv, "policy_node", kHelp, act);
 }

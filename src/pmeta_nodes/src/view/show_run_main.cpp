@@ -32,9 +32,7 @@ int show(const pmeta::Experiment&) {
   node.evaluate(goOn);
   ROS_INFO("showing the policies of %s, round %d; Ctrl-C ends it",
            run.experiment().settings().run_id.c_str(), run.round());
-  while (!pmeta_nodes::stopRequested()) {
-    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
-  }
+  pmeta_nodes::spinUntilStopped();
   return 0;
 }
 
