@@ -30,9 +30,12 @@ void Env::setState(const std::vector<double>&) {
   throw Error("environment '" + spec().name + "' cannot take up a state.");
 }
 
-void Env::saveState(StateWriter& writer) const { writer.array("state", state()); }
+void Env::saveState(StateWriter& writer) const {
+  if (spec().restorable) writer.array("state", state());
+}
 
 void Env::loadState(StateReader& reader) {
+  if (!spec().restorable) return;
   std::vector<double> saved(state().size());
   reader.array("state", saved);
   setState(saved);

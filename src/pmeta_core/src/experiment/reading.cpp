@@ -235,6 +235,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   experiment.algorithm_ = &algorithmNamed(e.algorithm);
   experiment.applyAlgorithm();
   experiment.checkAggregation();
+  experiment.checkBodies();
   experiment.checkLearning();
   e.results_dir = expandResultsDir(e.results_dir);
   if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);

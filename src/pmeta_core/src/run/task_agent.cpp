@@ -40,6 +40,8 @@ auto TaskAgent::guarded(int round, const Work& work) const {
     return work();
   } catch (const TaskFailed&) {
     throw;
+  } catch (const LostEnvironment& lost) {
+    throw TaskFailed(name_ + " failed in round " + std::to_string(round) + ": " + lost.what());
   } catch (const BrokenEpisode& episode) {
     fail(round, episode.reason(), simulation_settings_);
   } catch (const Error& error) {

@@ -29,13 +29,13 @@ private parameters
   ~single_inputs   observations that come one by one on input/NAME; all others are measured by joints
   ~ignored_joints  that joint_states may have, too
 subscribes   joint_states (sensor_msgs/JointState), reward (std_msgs/Float64)
-             "NAME" is observed as the position of joint NAME, "NAME_velocity" and "NAME_effort"
-             likewise; a reward is of each action, where a meta-policy finds out its task
 offers       arm (std_srvs/SetBool): true lets the policy act, false takes it back; it starts disarmed
              begin_episode (std_srvs/Trigger): an episode is over, and the next begins; where the
              policy observes rewards
 publishes    command (std_msgs/Float64MultiArray): numbers in the policy file's bounds, named by the
              labels of its layout; /diagnostics
+NAME is observed as the position of joint NAME, NAME_velocity and NAME_effort as what they say; a
+reward is of each action, where a meta-policy finds out its task.
 While it is disarmed, an input is stale, missing or refused, or the policy knows no action, the safe
 action is commanded; /diagnostics says why.
 )";

@@ -161,6 +161,7 @@ class Experiment {
   [[noreturn]] void refuseMemory() const;
   void applyAlgorithm();
   void checkAggregation() const;
+  void checkBodies() const;
   void checkLearning();
   void checkStability();
 
