@@ -236,6 +236,12 @@ Experiment checkedExperiment(const std::string& config, std::vector<std::string>
   Experiment experiment = resume.empty() ? Experiment::load(config, assignments)
                                          : Experiment::resume(resume, assignments, config);
   const pmeta::Authenticator probe(experiment.settings().key_file);
+  // what a package's environments cannot do is told here, and not by agents that start again and
+  // again
+  const bool foreign = !experiment.family().package().name.empty();
+  for (int task = 0; foreign && task < experiment.totalTasks(); ++task) {
+    experiment.family().make(task);
+  }
   if (resume.empty()) {
     pmeta::requireWritable(experiment.settings().results_dir + "/" +
                            experiment.settings().experiment);
