@@ -262,7 +262,8 @@ int check(const std::vector<std::string>& words) {
   if (words.size() < 2)
     throw Error("--check needs LAUNCH_FILE and CONFIG; see prepare_run --help.");
   std::vector<std::string> assignments = readAssignments(pmeta_nodes::handedOn(
-      {words.begin() + 2, words.end()}, pmeta_nodes::readLaunchFile(words[0])));
+      {words.begin() + 2, words.end()},
+      pmeta_nodes::readLaunchFile(words[0], std::filesystem::path(words[0]).parent_path())));
   takeLaunch(assignments);
   const Experiment experiment = checkedExperiment(words[1], assignments);
   std::cout << experiment.runDir() << "\n" << partyNodes(experiment).size() << "\n";
