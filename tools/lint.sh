@@ -7,7 +7,7 @@ lint_quick() (
   mapfile -t sources < <(git ls-files --cached --others --exclude-standard '*.cpp' '*.h')
   clang-format-14 --dry-run -Werror "${sources[@]}" || failed=1
   shellcheck pmeta .ci/run tools/*.sh tools/commands/*.sh || failed=1
-  pyflakes3 src/pmeta_nodes/scripts test tools || failed=1
+  pyflakes3 src/pmeta_nodes/scripts src/pmeta_nodes/python examples test tools || failed=1
   lint_docs || failed=1
   return $failed
 )
@@ -54,7 +54,7 @@ compiled_sources() { grep -xFf <(sed -n "s#^ *\"file\": \"$TOP/\(.*\)\".*#\1#p" 
 
 # What catkin_lint cannot know: tests, launch and settings files are beside the packages, not in
 # them; scripts are modules, too; pmeta_core builds without catkin, too; who builds against
-# pmeta_nodes needs no more than the headers of scenes include.
+# pmeta_nodes, scenes and servers of robots, needs no more than its headers include.
 CATKIN_LINT_IGNORES=(MISSING_FILE EXTERNAL_FILE MISSING_DIRECTORY EXTERNAL_DIRECTORY MISSING_SHEBANG
   UNINSTALLED_SCRIPT UNINSTALLED_TARGET MISSING_REQUIRED UNINSTALLED_INCLUDE_PATH
   WRONG_INSTALL_DESTINATION MISSING_CATKIN_DEPEND)

@@ -136,6 +136,22 @@ TEST(Evaluation, IsTheMeanOverEpisodesRunOneByOne) {
   }
 }
 
+TEST(Evaluation, FewerEnvironmentsTakeTurnsWithTheSameEpisodes) {
+  for (const int width : {1, 3}) {
+    const auto make = [](int) { return std::make_unique<Counter>(); };
+    Evaluation in_turns(makeEnvs(make, width), 7);
+    Evaluation at_once = makeEvaluation(7);
+    FunctionActor act(actions);
+    Rng rng(1, 0, Stream::kEvaluate), same = rng;
+    const ReturnStats stats = in_turns.run(act, rng);
+    const ReturnStats expected = at_once.run(act, same);
+    EXPECT_EQ(in_turns.width(), static_cast<std::size_t>(width));
+    EXPECT_EQ(stats.episodes, 7);
+    EXPECT_EQ(stats.mean, expected.mean);
+    EXPECT_EQ(stats.std, expected.std);
+  }
+}
+
 TEST(Evaluation, StopsAtTheHorizon) {
   Evaluation evaluation = makeEvaluation(3);
   int calls = 0;

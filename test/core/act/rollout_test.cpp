@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "../memory_state.h"
+#include "pmeta_core/env/one_body.h"
 
 namespace pmeta {
 namespace {
@@ -41,7 +42,11 @@ class Clock : public Env {
     observation[0] = number_ + start_;
     observation[1] = steps_;
   }
-  EnvSpec spec_{"clock", 2, 1, 0, 100};
+  EnvSpec spec_ = [] {
+    EnvSpec spec{"clock", 2, 1, 0, 100};
+    spec.restorable = true;
+    return spec;
+  }();
   int number_, breaks_in_;
   double start_ = 0;
   int episode_ = 0;
@@ -139,9 +144,29 @@ TEST(Rollout, OfABrokenStepNothingIsSeen) {
   EXPECT_THROW(rollout.step(scribe, rng), BrokenEpisode) << "two running";
 }
 
+TEST(Rollout, AnEpisodeThatAnotherHasEndedMakesPlaceForANewOne) {
+  const OneBody body(std::make_unique<Clock>(0, 0));
+  Rollout training(makeEnvs([&](int) { return body.handle(); }, 1), Rollout::AtEnd::kBeginAnother,
+                   0);
+  Rollout evaluation(makeEnvs([&](int) { return body.handle(); }, 1), Rollout::AtEnd::kStop, 0);
+  Scribe scribe, judge;
+  Rng rng(1, 0, Stream::kSample);
+  training.begin(1, scribe, rng);
+  training.step(scribe, rng);
+  training.step(scribe, rng);
+  scribe.log.clear();
+  for (evaluation.begin(1, judge, rng); evaluation.running();) evaluation.step(judge, rng);
+  EXPECT_EQ(judge.log.back(), "saw 0, the end");
+  EXPECT_EQ(training.step(scribe, rng), 1);
+  EXPECT_EQ(scribe.log, (Log{"begin 0", "look 0", "saw 0"}));
+  EXPECT_EQ(training.broken().count(), 0) << "nothing broke";
+}
+
 // a component as a learner saves it
 struct Saved {
-  Rollout rollout{clocks(2), Rollout::AtEnd::kBeginAnother, 0};
+  explicit Saved(std::vector<std::unique_ptr<Env>> envs = clocks(2))
+      : rollout(std::move(envs), Rollout::AtEnd::kBeginAnother, 0) {}
+  Rollout rollout;
   void saveState(StateWriter& writer) const { rollout.saveEpisodes(writer, "at", {"a", "b"}); }
   void loadState(StateReader& reader) { rollout.loadEpisodes(reader, "at", {"a", "b"}); }
 };
@@ -161,6 +186,21 @@ TEST(Rollout, GoesOnInTheMiddleOfEpisodes) {
   }
   EXPECT_EQ(one.log, other.log);
   EXPECT_EQ(a.rollout.observation(1)[0], b.rollout.observation(1)[0]);
+}
+
+TEST(Rollout, WhatCannotBeRestoredBeginsAnew) {
+  const auto bodies = [] {
+    return makeEnvs([](int k) { return OneBody(std::make_unique<Clock>(k, 0)).handle(); }, 2);
+  };
+  Saved a(bodies()), b(bodies());
+  Scribe one, other;
+  Rng rng(1, 0, Stream::kSample);
+  a.rollout.begin(2, one, rng);
+  a.rollout.step(one, rng);
+  test::load(b, test::stateOf(a));
+  EXPECT_EQ(b.rollout.step(other, rng), 2);
+  EXPECT_EQ(other.log,
+            (Log{"begin 0", "begin 1", "look 0 1", "saw 0, the end", "begin 0", "saw 1"}));
 }
 
 }  // namespace

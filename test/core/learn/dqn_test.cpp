@@ -327,6 +327,37 @@ TEST(Dqn, StoresWhatHappened) {
   }
 }
 
+// every second episode breaks down in its fifth step
+class Breaking : public Line {
+ public:
+  void reset(Rng& rng, double* observation) override {
+    ++episode_;
+    Line::reset(rng, observation);
+  }
+  Step step(const double* action, Rng& rng, double* observation) override {
+    const Step step = Line::step(action, rng, observation);
+    if (episode_ % 2 == 0 && observation[2] > 0.45) throw BrokenEpisode("line: it broke");
+    return step;
+  }
+
+ private:
+  int episode_ = 0;
+};
+
+TEST(Dqn, NoTransitionGoesFromABrokenEpisodeIntoTheNext) {
+  DqnSettings settings = smallSettings();
+  settings.n_step = 3;
+  DqnLearner learner(makeEnvs([](int) { return std::make_unique<Breaking>(); }, 2), settings, 1000);
+  AlignedFloats parameters(learner.network().size());
+  Rng rng(1, 0, Stream::kSample);
+  for (int i = 0; i < 50; ++i) learner.collect(parameters.data(), rng);
+  const ReplayBuffer& buffer = learner.replay().buffer();
+  ASSERT_GT(buffer.size(), 50u);
+  for (std::size_t k = 0; k < buffer.size(); ++k) {
+    EXPECT_GT(buffer[k].next_observation[2], buffer[k].observation[2]);
+  }
+}
+
 TEST(Dqn, OneSeedOneResult) {
   Trainer a(smallSettings(), 7), b(smallSettings(), 7), c(smallSettings(), 8);
   for (int i = 0; i < 50; ++i) {

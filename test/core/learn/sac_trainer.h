@@ -20,6 +20,7 @@ class PushedPoint : public Env {
     spec_.observation_size = 3;
     spec_.action_size = 2;
     spec_.horizon = 12;
+    spec_.restorable = true;
   }
   const EnvSpec& spec() const override { return spec_; }
   void reset(Rng& rng, double* observation) override {

@@ -1,26 +1,30 @@
 #include "pmeta_core/act/evaluation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 namespace pmeta {
 
-Evaluation::Evaluation(std::vector<std::unique_ptr<Env>> envs)
-    : rollout_(std::move(envs), Rollout::AtEnd::kStop, std::numeric_limits<int>::max()) {}
+Evaluation::Evaluation(std::vector<std::unique_ptr<Env>> envs, int episodes)
+    : rollout_(std::move(envs), Rollout::AtEnd::kStop, std::numeric_limits<int>::max()),
+      returns_(episodes > 0 ? static_cast<std::size_t>(episodes) : width()) {}
 
 ReturnStats Evaluation::run(Actor& actor, Rng& rng) {
   ReturnStats stats;
   const std::int64_t broken_before = rollout_.broken().count();
-  for (rollout_.begin(rollout_.size(), actor, rng); rollout_.running();) rollout_.step(actor, rng);
-  stats.episodes = episodes();
+  for (std::size_t first = 0; first < returns_.size(); first += width()) {
+    const std::size_t count = std::min(width(), returns_.size() - first);
+    for (rollout_.begin(count, actor, rng); rollout_.running();) rollout_.step(actor, rng);
+    for (std::size_t i = 0; i < count; ++i) returns_[first + i] = rollout_.returned(i);
+  }
+  stats.episodes = static_cast<int>(returns_.size());
   stats.broken_episodes = static_cast<int>(rollout_.broken().count() - broken_before);
-  for (std::size_t i = 0; i < rollout_.size(); ++i) stats.mean += rollout_.returned(i);
+  for (const double value : returns_) stats.mean += value;
   stats.mean /= stats.episodes;
   double squares = 0;
-  for (std::size_t i = 0; i < rollout_.size(); ++i) {
-    squares += (rollout_.returned(i) - stats.mean) * (rollout_.returned(i) - stats.mean);
-  }
+  for (const double value : returns_) squares += (value - stats.mean) * (value - stats.mean);
   stats.std = std::sqrt(squares / stats.episodes);
   return stats;
 }

@@ -19,7 +19,8 @@ Rollout::Rollout(std::vector<std::unique_ptr<Env>> envs, AtEnd at_end, int forgi
       observations_(envs_.size() * observation_size_),
       actions_(envs_.size() * action_size_),
       steps_(envs_.size()),
-      returns_(envs_.size()) {
+      returns_(envs_.size()),
+      unrestored_(envs_.size()) {
   running_.reserve(envs_.size());
 }
 
@@ -48,11 +49,22 @@ bool Rollout::beginEpisode(std::size_t i, Actor& actor, Rng& rng) {
   return true;
 }
 
+void Rollout::replaceInterrupted(Actor& actor, Rng& rng) {
+  for (std::size_t row = 0; row < running_.size(); ++row) {
+    const std::size_t i = running_[row];
+    if (!unrestored_[i] && !envs_[i]->interrupted()) continue;
+    unrestored_[i] = false;
+    beginEpisode(i, actor, rng);
+    place(i, row);
+  }
+}
+
 void Rollout::place(std::size_t i, std::size_t row) {
   std::copy_n(observation(i), observation_size_, &seen_[row * observation_size_]);
 }
 
 std::int64_t Rollout::step(Actor& actor, Rng& rng) {
+  if (at_end_ == AtEnd::kBeginAnother) replaceInterrupted(actor, rng);
   actor.look(seen_.data(), running_);
   std::int64_t transitions = 0;
   std::size_t kept = 0;
@@ -105,6 +117,7 @@ void Rollout::loadEpisodes(StateReader& reader, const std::string& observations,
   running_.resize(envs_.size());
   for (std::size_t i = 0; i < envs_.size(); ++i) {
     running_[i] = i;
+    unrestored_[i] = !envs_[i]->spec().restorable;
     reader.part(env_names[i], *envs_[i]);
   }
 }

@@ -8,7 +8,7 @@ namespace {
 
 AdaptedReturn evaluateKnown(Evaluation& evaluation, const Adaptation& adaptation, int episodes,
                             Rng& rng) {
-  const auto actor = adaptation.adapted(static_cast<std::size_t>(evaluation.episodes()));
+  const auto actor = adaptation.adapted(evaluation.width());
   return {episodes, evaluation.run(*actor, rng), adaptation.taskInput(), adaptation.taskWeights()};
 }
 

@@ -252,20 +252,22 @@ void Settings::bind(const std::string& key, std::vector<double>& value, const st
 }
 
 void Settings::bind(const std::string& key, std::vector<std::string>& value, const std::string& doc,
-                    std::vector<std::string> choices) {
+                    std::vector<std::string> choices, Empty empty) {
   const std::string allowed =
       choices.empty() ? "a list of words" : "a list of words out of " + join(choices);
   add({key, doc, allowed, "",
        [=, &value](const YAML::Node& node, const std::string& where) {
-         value = readList<std::string>(key, node, where, allowed,
-                                       [&](const YAML::Node& one, std::string& out) {
-                                         if (!one.IsScalar()) return false;
-                                         out = one.Scalar();
-                                         if (!choices.empty() && !contains(choices, out)) {
-                                           refuseWord(key + " holds ", out, where, choices);
-                                         }
-                                         return true;
-                                       });
+         value = readList<std::string>(
+             key, node, where, allowed,
+             [&](const YAML::Node& one, std::string& out) {
+               if (!one.IsScalar()) return false;
+               out = one.Scalar();
+               if (!choices.empty() && !contains(choices, out)) {
+                 refuseWord(key + " holds ", out, where, choices);
+               }
+               return true;
+             },
+             empty);
        },
        [&value] { return listText<std::string>(value, asYaml); }});
 }

@@ -49,7 +49,7 @@ void EnvFamily::requireSizes(int task, const EnvSpec& spec) const {
            " of action and " + std::to_string(actions) + " discrete actions";
   };
   // a body is not asked for what another task needs to know
-  if (spec.copies > 0 && task != 0) return;
+  if (hasOneBody() && task != 0) return;
   std::call_once(sizes_->known, [&] {
     const std::unique_ptr<Env> first = task == 0 ? nullptr : created(0);
     const EnvSpec& known = task == 0 ? spec : first->spec();
@@ -111,9 +111,12 @@ std::string Env::description() const {
   return made_as_.empty() ? "environment '" + spec().name + "'" : made_as_;
 }
 
-void Env::saveState(StateWriter& writer) const { writer.array("state", state()); }
+void Env::saveState(StateWriter& writer) const {
+  if (spec().restorable) writer.array("state", state());
+}
 
 void Env::loadState(StateReader& reader) {
+  if (!spec().restorable) return;
   std::vector<double> saved(state().size());
   reader.array("state", saved);
   setState(saved);

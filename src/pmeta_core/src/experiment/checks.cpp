@@ -55,6 +55,20 @@ void Experiment::checkAggregation() const {
   }
 }
 
+void Experiment::checkBodies() const {
+  if (!family_->hasOneBody()) return;
+  const std::string one =
+      "environment '" + settings_.environment + "' has one body for each task, but ";
+  if (hasMetaLearner() || algorithm_->pools_environments) {
+    throw Error(one + "algorithm " + settings_.algorithm +
+                " acts in all tasks in one process: choose one in which each task has an agent.");
+  }
+  if (learner_->trainingEnvs() > 1) {
+    throw Error(one + settings_.learner + ".num_envs is " +
+                std::to_string(learner_->trainingEnvs()) + ": set it to 1.");
+  }
+}
+
 void Experiment::checkLearning() {
   const bool portable = settings_.arithmetic == "portable";
   if (hasMetaLearner()) return meta_learner_->setPortable(portable);

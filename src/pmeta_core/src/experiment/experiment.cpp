@@ -23,7 +23,9 @@ std::map<std::string, std::string> Experiment::definingSettings(const std::strin
   // of a model its hash counts, not where it is
   for (const char* key :
        {"results_dir", "pace", "publish_trajectories", "key_file", "checkpoint.interval",
-        "aggregation.round_timeout", "environment.model_file", "library", "threads"}) {
+        "aggregation.round_timeout", "environment.model_file", "environment.timeout",
+        "environment.reset_timeout", "environment.retries", "environment.patience", "library",
+        "threads"}) {
     settings.erase(key);
   }
   return settings;

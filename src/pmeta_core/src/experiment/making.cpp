@@ -93,6 +93,7 @@ std::unique_ptr<PersonalLearner> Experiment::makeLearner(int task) const {
     order.trains = !isTestTask(task);
     order.shares = evaluatesMeta();
     order.pools = algorithm_->pools_environments;
+    if (family_->hasOneBody()) order.body = std::make_shared<OneBody>(family_->make(task));
     order.total_updates = static_cast<std::int64_t>(settings_.rounds) * settings_.updates_per_round;
     return std::make_unique<PersonalLearner>(learner_->make(order), settings_.personal);
   } catch (const std::bad_alloc&) {

@@ -235,6 +235,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   experiment.algorithm_ = &algorithmNamed(e.algorithm);
   experiment.applyAlgorithm();
   experiment.checkAggregation();
+  experiment.checkBodies();
   experiment.checkLearning();
   experiment.checkPackage();
   e.results_dir = expandResultsDir(e.results_dir);

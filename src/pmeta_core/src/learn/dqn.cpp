@@ -9,7 +9,7 @@ DqnLearner::DqnLearner(std::vector<std::unique_ptr<Env>> envs, const DqnSettings
                        std::int64_t total_updates)
     : settings_(settings),
       policies_(dqnNetwork(envs.front()->spec(), settings)),
-      rollout_(std::move(envs), Rollout::AtEnd::kBeginAnother, 0),
+      rollout_(std::move(envs), Rollout::AtEnd::kBeginAnother, BrokenEpisodes::kForgiven),
       schedule_{settings.epsilon_start, settings.epsilon_finish,
                 settings.epsilon_fraction * static_cast<double>(total_updates)},
       acting_(network(), rollout_.size()),
@@ -34,8 +34,13 @@ std::int64_t DqnLearner::collect(const float* parameters, Rng& rng) {
   for (int t = 0; t < settings_.env_steps_per_update; ++t) {
     transitions += rollout_.step(*this, rng);
   }
+  // an update needs one, and each episode so far may have broken down
+  while (replay_.size() == 0) transitions += rollout_.step(*this, rng);
   return transitions;
 }
+
+// nothing waits but of an episode that has not come to its end
+void DqnLearner::begin(std::size_t env, Rng&) { n_step_.drop(static_cast<int>(env)); }
 
 void DqnLearner::look(const float* observations, const std::vector<std::size_t>& envs) {
   acting_.look(observations, envs);
@@ -66,7 +71,9 @@ void DqnLearner::beginRound(const Model& meta, bool first) {
 UpdateStats DqnLearner::learn(const Model& parameters, const AnyOptimizer& optimizer, Rng& rng) {
   const float* values = parameters.floats().data();
   UpdateStats stats;
+  const std::int64_t broken_before = rollout_.broken().count();
   stats.env_steps = collect(values, rng);
+  stats.broken_episodes = rollout_.broken().count() - broken_before;
   stats.loss = update(values, *std::get<Optimizer<float>*>(optimizer), rng);
   stats.updates = 1;
   losses_.front().value = stats.loss;

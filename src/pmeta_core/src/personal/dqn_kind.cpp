@@ -28,8 +28,7 @@ class DqnKind : public LearnerKind {
     PersonalParts parts;
     parts.learner = std::make_unique<DqnLearner>(makeEnvs(training_env, settings_.num_envs),
                                                  settings_, task.total_updates);
-    parts.evaluation_envs =
-        makeEnvs([&](int) { return task.makeEnv(); }, settings_.evaluation_episodes);
+    task.evaluateOver(settings_.evaluation_episodes, parts);
     return parts;
   }
 

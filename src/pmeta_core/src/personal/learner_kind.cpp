@@ -7,6 +7,11 @@ Registry<LearnerRow>& learners() {
   return learners;
 }
 
+void LearnerTask::evaluateOver(int episodes, PersonalParts& parts) const {
+  parts.evaluation_envs = makeEnvs([&](int) { return makeEnv(); }, body ? 1 : episodes);
+  parts.evaluation_episodes = episodes;
+}
+
 void bindAdam(Settings& settings, PersonalSettings& personal) {
   settings.bind("personal.learning_rate", personal.learning_rate, "Adam's learning rate",
                 Range::above(0));

@@ -32,7 +32,8 @@ std::vector<NetworkRange> ownRanges(const ModelLayout& layout, const NetworkLamb
 
 PersonalLearner::PersonalLearner(PersonalParts parts, const PersonalSettings& settings)
     : parts_(std::move(parts)),
-      evaluation_(std::make_unique<Evaluation>(std::move(parts_.evaluation_envs))),
+      evaluation_(std::make_unique<Evaluation>(std::move(parts_.evaluation_envs),
+                                               parts_.evaluation_episodes)),
       personal_(parts_.learner->blank()),
       auxiliary_(personal_),
       optimizer_(makePull(personal_, auxiliary_, settings)) {
@@ -107,7 +108,7 @@ ReturnStats PersonalLearner::evaluate(const Model& policy, const std::vector<flo
                                       Rng& rng) const {
   if (const std::optional<ReturnStats> exact = parts_.learner->exactReturn(policy)) return *exact;
   const std::unique_ptr<Actor> actor =
-      parts_.learner->policies().actor(policy, task_input, evaluation_->episodes());
+      parts_.learner->policies().actor(policy, task_input, evaluation_->width());
   return evaluation_->run(*actor, rng);
 }
 

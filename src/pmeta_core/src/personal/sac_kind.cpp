@@ -52,8 +52,7 @@ class SacKind : public LearnerKind {
       };
     }
     parts.learner = std::move(learner);
-    parts.evaluation_envs =
-        makeEnvs([&](int) { return task.makeEnv(); }, settings.evaluation_episodes);
+    task.evaluateOver(settings.evaluation_episodes, parts);
     parts.reset_moments = settings.reset_moments;
     return parts;
   }

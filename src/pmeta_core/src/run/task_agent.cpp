@@ -43,6 +43,8 @@ auto TaskAgent::guarded(int round, const Work& work) const {
     throw;
   } catch (const FaultyEnv& fault) {
     throw TaskFailed("round " + std::to_string(round) + " failed: " + fault.what());
+  } catch (const LostEnvironment& lost) {
+    throw TaskFailed(name_ + " failed in round " + std::to_string(round) + ": " + lost.what());
   } catch (const BrokenEpisode& episode) {
     fail(round, episode.reason(), simulation_settings_);
   } catch (const Error& error) {

@@ -9,6 +9,7 @@
 #include "common/run_node.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
+#include "pmeta_core/base/process.h"
 #include "pmeta_core/run/divergence.h"
 #include "pmeta_core/storage/policy_file.h"
 
@@ -160,21 +161,29 @@ void PartyNode::train() {
       try {
         trainFrom(fromMsg(std::move(**msg)));
       } catch (const pmeta::TaskFailed& failure) {
-        ROS_ERROR("%s", failure.what());
-        gave_up_ = true;
-        setState(AgentStatus::FAILED, failure.what());
+        giveUp(failure.what());
+      } catch (const pmeta::LostEnvironment& lost) {
+        giveUp(lost.what());
       } catch (const pmeta::Error& error) {
         // a meta-policy that does not fit is not trained on; a good one may still come
         ROS_ERROR("%s", error.what());
         setState(AgentStatus::WAITING, error.what());
       }
     }
+  } catch (const pmeta::Interrupted&) {
+    // whoever spins stops this
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());
     // nothing that is known to come again: roslaunch starts this process anew
     setState(AgentStatus::WAITING, error.what());
     failed_ = true;
   }
+}
+
+void PartyNode::giveUp(const std::string& failure) {
+  ROS_ERROR("%s", failure.c_str());
+  gave_up_ = true;
+  setState(AgentStatus::FAILED, failure);
 }
 
 void PartyNode::evaluate(const pmeta::MetaPolicy& meta) {
@@ -186,7 +195,8 @@ void PartyNode::evaluate(const pmeta::MetaPolicy& meta) {
            "evaluating the meta-policy of round " + std::to_string(meta.round));
   for (const pmeta::TaskReturn& result : party_->evaluateMeta(meta)) deliver(result);
   for (const auto& [task, publisher] : trajectory_pubs_) {
-    publishEpisode(party_->recordMeta(meta, task), task, meta.round, pmeta::PolicyKind::kMeta);
+    showEpisode([&, of = task] { return party_->recordMeta(meta, of); }, task, meta.round,
+                pmeta::PolicyKind::kMeta);
   }
 }
 
@@ -245,9 +255,8 @@ void PartyNode::trainFrom(const pmeta::MetaPolicy& meta) {
   if (result->personal) deliver(*result->personal);
   deliver(std::move(result->update));
   if (!trajectory_pubs_.empty() && result->personal) {
-    if (const auto episode = party_->recordPersonal()) {
-      publishEpisode(*episode, party_->number(), round, pmeta::PolicyKind::kPersonal);
-    }
+    showEpisode([this] { return party_->recordPersonal(); }, party_->number(), round,
+                pmeta::PolicyKind::kPersonal);
   }
   setState(AgentStatus::WAITING, "waiting for the meta-policy of round " + std::to_string(round));
 }
@@ -268,7 +277,11 @@ void PartyNode::returnTo(const pmeta::MetaPolicy& meta) {
   const int round = checkpoints_.loadNewest(meta.round + 1, fresh, refused);
   for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
   saved_round_ = round;
-  if (round > 0) ROS_INFO("%s goes on after round %d.", name_.c_str(), round);
+  if (round > 0) {
+    const bool restorable = experiment_.family().make(tasks_.front())->spec().restorable;
+    ROS_INFO("%s goes on after round %d%s.", name_.c_str(), round,
+             restorable ? "" : ", with a new episode: the last one cannot be restored");
+  }
   if (round < meta.round) {
     ROS_WARN("%s has lost what it learnt in the rounds %d to %d: no good checkpoint is newer.",
              name_.c_str(), round + 1, meta.round);

@@ -66,6 +66,7 @@ class PartyNode {
   bool isAuthentic(const std::string& kind, pmeta::Authenticity authenticity);
 
   void train();
+  void giveUp(const std::string& failure);
   void evaluate(const pmeta::MetaPolicy& meta);
   void trainFrom(const pmeta::MetaPolicy& meta);
   void returnTo(const pmeta::MetaPolicy& meta);
@@ -75,7 +76,8 @@ class PartyNode {
   void deliver(const pmeta::TaskReturn& result);
   void deliver(pmeta::AuxiliaryUpdate update);
   void advertiseEpisodes(int task);
-  void publishEpisode(const pmeta::Episode& episode, int task, int round, pmeta::PolicyKind policy);
+  void showEpisode(const std::function<std::optional<pmeta::Episode>()>& record, int task,
+                   int round, pmeta::PolicyKind policy);
   void setState(std::uint8_t state, const std::string& message);
   void publishStatus();
   void resend();

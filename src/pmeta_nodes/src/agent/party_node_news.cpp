@@ -51,9 +51,16 @@ void PartyNode::advertiseEpisodes(int task) {
       });
 }
 
-void PartyNode::publishEpisode(const pmeta::Episode& episode, int task, int round,
-                               pmeta::PolicyKind policy) {
-  pmeta_msgs::Trajectory msg = toMsg(episode, experiment_, task, round, policy);
+void PartyNode::showEpisode(const std::function<std::optional<pmeta::Episode>()>& record, int task,
+                            int round, pmeta::PolicyKind policy) {
+  std::optional<pmeta::Episode> episode;
+  try {
+    episode = record();
+  } catch (const pmeta::BrokenEpisode& broken) {
+    ROS_WARN("there is no episode to show: %s", broken.what());
+  }
+  if (!episode) return;
+  pmeta_msgs::Trajectory msg = toMsg(*episode, experiment_, task, round, policy);
   msg.header.stamp = ros::Time::now();
   trajectory_pubs_.at(task).publish(msg);
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -109,6 +116,7 @@ HealthReport PartyNode::health() {
                    {"broken episodes", std::to_string(status_.broken_episodes)},
                    {"unconfirmed messages",
                     std::to_string(unconfirmed_returns_.size() + unconfirmed_updates_.size())}};
+  for (auto& figure : experiment_.family().figures()) report.values.push_back(std::move(figure));
   for (std::size_t k = 1; k < status_.losses.size(); ++k) {
     report.values.emplace_back("loss: " + status_.loss_names[k],
                                pmeta::formatNumber(status_.losses[k]));

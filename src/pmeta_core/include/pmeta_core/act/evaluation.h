@@ -8,19 +8,20 @@
 
 namespace pmeta {
 
-/// Environments of one task that serve evaluation only: one for each episode.
+/// Environments of one task that serve evaluation only: one for each episode, or fewer that take
+/// turns.
 class Evaluation {
  public:
-  /// `envs`: at least one, all of one task.
-  explicit Evaluation(std::vector<std::unique_ptr<Env>> envs);
+  /// `envs`: at least one, all of one task. `episodes`: of one run(); 0: one in each environment.
+  explicit Evaluation(std::vector<std::unique_ptr<Env>> envs, int episodes = 0);
 
-  /// Of one run(): the number of environments.
-  int episodes() const { return static_cast<int>(rollout_.size()); }
+  /// In how many environments an actor acts at a time.
+  std::size_t width() const { return rollout_.size(); }
 
-  /// Undiscounted returns of one episode in each environment. They run in step, so that the actor
-  /// sees them as one batch; all starts are drawn before the first step and thus, of an actor that
-  /// draws nothing, depend on `rng` only. An episode that breaks down counts with its return until
-  /// then.
+  /// Undiscounted returns of so many episodes. One in each environment run in step, so that the
+  /// actor sees them as one batch; their starts are drawn before the first step. All starts, of an
+  /// actor and environments that draw nothing, depend on `rng` only. An episode that breaks down
+  /// counts with its return until then.
   ReturnStats run(Actor& actor, Rng& rng);
 
   /// One episode, from the start that the first episode of run() has at the same `rng`. Where it
@@ -33,6 +34,7 @@ class Evaluation {
 
  private:
   Rollout rollout_;
+  std::vector<double> returns_;  // of one run()
 };
 
 }  // namespace pmeta

@@ -26,8 +26,10 @@ class Rollout {
   void begin(std::size_t count, Actor& actor, Rng& rng);
 
   /// One step in each environment whose episode goes on: the actor looks at all, then acts in one
-  /// after the other. Of a step that breaks its episode nothing is kept. Returns the transitions.
-  /// Allocates nothing. Throws Error where the actor knows no action, FaultyEnv as StepGuard does.
+  /// after the other. With kBeginAnother, an episode that somebody else has ended, or that could
+  /// not be restored, makes place for another first. Of a step that breaks its episode nothing is
+  /// kept. Returns the transitions. Allocates nothing. Throws Error where the actor knows no
+  /// action, FaultyEnv as StepGuard does.
   std::int64_t step(Actor& actor, Rng& rng);
 
   bool running() const { return !running_.empty(); }  ///< does any episode go on?
@@ -49,12 +51,14 @@ class Rollout {
   /// `observations`, and their states, each under its one of `env_names`.
   void saveEpisodes(StateWriter& writer, const std::string& observations,
                     const std::vector<std::string>& env_names) const;
-  /// Goes on from there. Throws Error where Env::loadState() does, or the sizes differ.
+  /// Goes on from there, but with new episodes where environments are not restorable. Throws Error
+  /// where Env::loadState() does, or the sizes differ.
   void loadEpisodes(StateReader& reader, const std::string& observations,
                     const std::vector<std::string>& env_names);
 
  private:
   bool beginEpisode(std::size_t i, Actor& actor, Rng& rng);
+  void replaceInterrupted(Actor& actor, Rng& rng);
   bool stepOne(std::size_t row, Actor& actor, Rng& rng, std::int64_t& transitions);
   void place(std::size_t i, std::size_t row);
 
@@ -72,6 +76,7 @@ class Rollout {
   std::vector<double> actions_;
   std::vector<Step> steps_;
   std::vector<double> returns_;
+  std::vector<bool> unrestored_;
 };
 
 }  // namespace pmeta

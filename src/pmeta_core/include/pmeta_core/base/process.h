@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <stdexcept>
 
 namespace pmeta {
 
@@ -18,6 +19,12 @@ void heedStopSignals(const char* told = "");
 
 /// Has such a signal come?
 const std::atomic<bool>& stopSignalled();
+
+/// What was under way is given up, since the process has been asked to stop: nothing to tell of.
+class Interrupted : public std::runtime_error {
+ public:
+  Interrupted() : std::runtime_error("the process has been asked to stop") {}
+};
 
 /// Flushes standard output, of C and of C++. False if anything printed there is lost, but for a
 /// reader that has gone, as `head` does: it has seen enough.

@@ -70,9 +70,9 @@ class Settings {
   /// The same of numbers with decimals.
   void bind(const std::string& key, std::vector<double>& value, const std::string& doc,
             Range range = {}, Empty empty = Empty::kRefused);
-  /// Words, at least one; `choices` holds for each.
+  /// Words; `choices` holds for each.
   void bind(const std::string& key, std::vector<std::string>& value, const std::string& doc,
-            std::vector<std::string> choices = {});
+            std::vector<std::string> choices = {}, Empty empty = Empty::kRefused);
 
   /// Reads a map of (nested) settings; `source` names it in errors.
   void read(const YAML::Node& root, const std::string& source);

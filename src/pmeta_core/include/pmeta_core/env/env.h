@@ -5,6 +5,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pmeta_core/base/error.h"
@@ -44,6 +45,13 @@ class BrokenEpisode : public Error {
   std::string reason_;
 };
 
+/// An environment that nobody can act in, however often it is tried: a robot that stays away, or
+/// another one than was told. The sentence says all that there is to do.
+class LostEnvironment : public Error {
+ public:
+  using Error::Error;
+};
+
 class MujocoModel;
 
 /// One MDP. All randomness comes in as an argument; the state is the only thing that is kept.
@@ -61,6 +69,9 @@ class Env {
   /// Acts once. A discrete action a is passed as action[0] == a.
   virtual Step step(const double* action, Rng& rng, double* observation) = 0;
 
+  /// Has the episode been ended from elsewhere? Then reset(), not step(), comes next.
+  virtual bool interrupted() const { return false; }
+
   /// All that the next step depends on, for checkpoints and recorded trajectories; the last number
   /// is the count of steps since the reset. Throws Error unless spec().restorable.
   virtual std::vector<double> state() const;
@@ -75,7 +86,8 @@ class Env {
   /// spec().restorable.
   virtual void setState(const std::vector<double>& state);
 
-  /// state() and setState(); loading refuses an episode that is over.
+  /// state() and setState(), nothing unless spec().restorable; loading refuses an episode that is
+  /// over.
   void saveState(StateWriter& writer) const;
   /// Goes on from what saveState() wrote of the same task; throws as setState() does.
   void loadState(StateReader& reader);
@@ -141,6 +153,12 @@ class EnvFamily {
   /// A new environment of that task. The family must outlive it. Throws FaultyEnv if it cannot be
   /// made, is described wrongly, or has other sizes than those of other tasks.
   std::unique_ptr<Env> make(int task) const;
+
+  /// Is each task one body, as a robot is, of which no two environments may be at a time?
+  virtual bool hasOneBody() const { return false; }
+
+  /// What its environments have met with so far, for people: name and figure. From any thread.
+  virtual std::vector<std::pair<std::string, std::string>> figures() const { return {}; }
 
   /// The package that it is of.
   const Package& package() const { return package_; }

@@ -29,7 +29,6 @@ struct EnvSpec {
   std::vector<std::string> choices{};   ///< names of the discrete actions, or none
   double step_seconds = 0;              ///< how long a step takes, s; 0: there is no such time
   bool restorable = false;              ///< Env::state() and Env::setState() work
-  int copies = 0;  ///< how many environments there may be at a time, 1 for a body; 0: any number
 };
 
 /// The spec of those observations and actions, its sizes counted. `choices` are the discrete

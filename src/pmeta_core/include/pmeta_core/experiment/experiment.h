@@ -164,6 +164,7 @@ class Experiment {
   [[noreturn]] void refuseMemory() const;
   void applyAlgorithm();
   void checkAggregation() const;
+  void checkBodies() const;
   void checkLearning();
   void checkStability();
   void checkPackage();

@@ -33,7 +33,9 @@ class DqnLearner : public Learner, private Actor {
   void resetTargets(const float* parameters) { update_.resetTargets(parameters); }
 
   /// env_steps_per_update epsilon-greedy steps in each environment, kept in the replay; the first
-  /// call also starts the environments and warms them up. Returns the transitions made.
+  /// call also starts the environments and warms them up. Of an episode that breaks down or is
+  /// interrupted, the last steps, which still wait for rewards, are dropped. Returns the
+  /// transitions made.
   std::int64_t collect(const float* parameters, Rng& rng);
 
   /// One batch from the replay, see DqnUpdate; then sets new priorities. Returns the loss.
@@ -66,6 +68,7 @@ class DqnLearner : public Learner, private Actor {
   void loadState(StateReader& reader) override;
 
  private:
+  void begin(std::size_t env, Rng& rng) override;
   void look(const float* observations, const std::vector<std::size_t>& envs) override;
   bool act(std::size_t row, Rng& rng, double* action) override;
   void observe(const Experience& experience) override;

@@ -10,6 +10,7 @@
 #include "pmeta_core/base/registry.h"
 #include "pmeta_core/base/settings.h"
 #include "pmeta_core/env/env.h"
+#include "pmeta_core/env/one_body.h"
 #include "pmeta_core/personal/personal_learner.h"
 
 namespace pmeta {
@@ -19,12 +20,15 @@ struct LearnerTask {
   std::shared_ptr<const EnvFamily> family;  ///< built; kept alive by whoever holds this
   int task = 0;                             ///< a training or test task of the family
   bool trains = true;                       ///< false: a test task, on which nothing is learnt
-  bool shares = true;              ///< does each round begin with what comes back of all tasks?
-  bool pools = false;              ///< does it train in environments of all tasks?
-  std::int64_t total_updates = 0;  ///< of the whole run
+  bool shares = true;               ///< does each round begin with what comes back of all tasks?
+  bool pools = false;               ///< does it train in environments of all tasks?
+  std::int64_t total_updates = 0;   ///< of the whole run
+  std::shared_ptr<OneBody> body{};  ///< of the task, where its family has one body; else null
 
-  /// A new environment of the task.
-  std::unique_ptr<Env> makeEnv() const { return family->make(task); }
+  /// A new environment of the task, or another handle to its body.
+  std::unique_ptr<Env> makeEnv() const { return body ? body->handle() : family->make(task); }
+  /// Environments, and how many episodes an evaluation in them has.
+  void evaluateOver(int episodes, PersonalParts& parts) const;
 };
 
 /// A kind of learner with its settings: how they are read and checked, and what is made of them.

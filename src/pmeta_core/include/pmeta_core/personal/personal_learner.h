@@ -19,11 +19,12 @@ namespace pmeta {
 /// What a personal learner is made of.
 struct PersonalParts {
   std::unique_ptr<Learner> learner;                   ///< of the task; not null
-  std::vector<std::unique_ptr<Env>> evaluation_envs;  ///< one for each episode of an evaluation
+  std::vector<std::unique_ptr<Env>> evaluation_envs;  ///< see Evaluation
   bool reset_moments = false;                         ///< the optimiser begins anew with each round
   /// Makes what a meta-policy gets to know a task by; null: it is told what the learner knows.
   std::function<std::unique_ptr<Adaptation>(const Model& policy)> adapt = {};
   std::vector<int> exploration_episodes = {};  ///< it is evaluated after so many; ascending
+  int evaluation_episodes = 0;                 ///< of an evaluation; see Evaluation
 };
 
 /// A learner bound to one task with its personal parameters phi and auxiliary parameters omega, and

@@ -39,6 +39,9 @@ class NStepAccumulator {
   void add(int env, const float* observation, const float* action, const Step& step,
            const float* next_observation, PrioritisedReplay& replay);
 
+  /// Drops the steps of environment `env` that wait for rewards which will never come.
+  void drop(int env) { queues_[static_cast<std::size_t>(env)].size = 0; }
+
   void saveState(StateWriter& writer) const;  ///< every environment's steps that still wait
   /// Refuses as Queue::loadState() does, or where there are fewer environments.
   void loadState(StateReader& reader);
