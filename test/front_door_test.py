@@ -286,27 +286,6 @@ def test_a_second_interrupt_does_not_wait_for_the_round(tmp_path):
     assert process.returncode == -signal.SIGINT
 
 
-def test_the_installed_packages_work_like_the_source_tree(tmp_path):
-    # programs, launch files and settings from install/ alone; catkin writes its path into setup.sh
-    prefix = TOP / "install"
-    shutil.rmtree(str(prefix), ignore_errors=True)
-    result = run(["make", "-C", TOP / "build", "install"], timeout=300)
-    assert result.returncode == 0, result.stdout + result.stderr
-    env = environment(tmp_path, "install/setup.bash")
-    assert str(TOP / "src") not in env["ROS_PACKAGE_PATH"]
-    assert str(TOP / "devel") not in env["LD_LIBRARY_PATH"]
-    where = run(["rospack", "find", "pmeta_nodes"], env=env).stdout
-    assert where.startswith(str(prefix))
-    run(["roslaunch", "pmeta_nodes", "gridworld.launch", "pace:=0", "results_dir:=%s" % tmp_path,
-         "run_id:=installed"], env=env)
-    manifest = json.loads((tmp_path / "gridworld/installed/manifest.json").read_text())
-    assert manifest["status"] == "finished"
-    for program in ("plot.py", "report.py"):
-        result = run(["rosrun", "pmeta_nodes", program, tmp_path / "gridworld/installed"], env=env)
-        assert result.returncode == 0, result.stderr
-    assert (tmp_path / "gridworld/installed/report.html").exists()
-
-
 def test_every_program_answers_help(tmp_path):
     env = environment(tmp_path)
     scripts = [path.name for path in (TOP / "src/pmeta_nodes/scripts").glob("[!p]*.py")

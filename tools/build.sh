@@ -1,12 +1,26 @@
 # Building, and whether it is needed.
 
+# arguments: a workspace's setup.bash, and what it is given
 source_setup() {
   local file=$1
   [ -f "$file" ] || die "$file is missing: run ./pmeta build first."
   set +u
   # shellcheck disable=SC1090
-  . "$file"
+  . "$file" "${@:2}"
   set -u
+}
+
+# The caller's own workspaces, which may have environments for pMeta, but for those with a pMeta of
+# their own; those that are looked into first come first in OVERLAYS.
+source_overlays() {
+  local prefixes at prefix
+  IFS=: read -ra prefixes <<< "$OVERLAYS"
+  for ((at = ${#prefixes[@]} - 1; at >= 0; at--)); do
+    prefix=${prefixes[at]}
+    if [ -f "$prefix/.catkin" ] && [[ $prefix != /opt/ros/* && ! -d $prefix/share/pmeta_core ]]; then
+      source_setup "$prefix/setup.bash" --extend
+    fi
+  done
 }
 
 # percentages as they pass; the whole output is in the log
@@ -118,6 +132,7 @@ build() {
 ensure_built() {
   build
   source_setup "$TOP/devel/setup.bash"
+  source_overlays
   # nodes talk on this machine only, unless the user says otherwise
   [ -n "${ROS_IP:-}${ROS_HOSTNAME:-}" ] || export ROS_IP=127.0.0.1
   export ROSCONSOLE_STDOUT_LINE_BUFFERED=1

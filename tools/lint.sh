@@ -53,8 +53,8 @@ all_sources() (
 compiled_sources() { grep -xFf <(sed -n "s#^ *\"file\": \"$TOP/\(.*\)\".*#\1#p" build/compile_commands.json) || true; }
 
 # What catkin_lint cannot know: tests, launch and settings files are beside the packages, not in
-# them; scripts are modules, too; pmeta_core builds without catkin, too; of pmeta_nodes
-# servers of robots alone are built against.
+# them; scripts are modules, too; pmeta_core builds without catkin, too; who builds against
+# pmeta_nodes, scenes and servers of robots, needs no more than its headers include.
 CATKIN_LINT_IGNORES=(MISSING_FILE EXTERNAL_FILE MISSING_DIRECTORY EXTERNAL_DIRECTORY MISSING_SHEBANG
   UNINSTALLED_SCRIPT UNINSTALLED_TARGET MISSING_REQUIRED UNINSTALLED_INCLUDE_PATH
   WRONG_INSTALL_DESTINATION MISSING_CATKIN_DEPEND)

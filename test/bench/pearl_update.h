@@ -17,7 +17,9 @@ class NoiseFamily : public pmeta::EnvFamily {
   int numTasks() const override { return 2; }
   std::string taskName(int) const override { return "noise"; }
   std::string taskDescription(int) const override { return "noise"; }
-  std::unique_ptr<pmeta::Env> make(int) const override { return std::make_unique<NoiseEnv>(20, 6); }
+  std::unique_ptr<pmeta::Env> create(int) const override {
+    return std::make_unique<NoiseEnv>(20, 6);
+  }
 };
 
 /// PEARL's update with its default settings, after its warm-up.

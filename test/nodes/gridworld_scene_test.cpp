@@ -1,5 +1,5 @@
 #include "view/gridworld_scene.h"
-#include "draw/scene_parts.h"
+#include "pmeta_nodes/scene_parts.h"
 
 #include <gtest/gtest.h>
 #include <boost/make_shared.hpp>

@@ -117,4 +117,14 @@ TEST_F(Folder, OtherLaunchFilesHaveArgumentsOfTheirOwn) {
             (Words{"config.yaml", "agents.launch", "seed:=4", "lamda:=5"}));
 }
 
+TEST_F(Folder, ThoseThatIncludeOneOfPmetasAreUnderstood) {
+  std::filesystem::create_directory(path_ / "robot");
+  const std::string file = path_ / "robot/robot.launch";
+  std::ofstream(file) << "<launch><arg name=\"port\" default=\"\"/>"
+                         "<include file=\"$(find pmeta_nodes)/launch/common.launch\"/></launch>";
+  EXPECT_EQ(
+      wordsOfLaunch("config.yaml\nseed:=", {"roslaunch", file, "lamda:=5", "port:=COM1"}, path_),
+      (Words{"config.yaml", "seed:=", "lamda:=5"}));
+}
+
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "draw/card.h"
+#include "pmeta_nodes/card.h"
 #include "scene_support.h"
 
 namespace pmeta_nodes {

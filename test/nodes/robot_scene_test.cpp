@@ -271,7 +271,7 @@ class CartFamily : public pmeta::EnvFamily {
   int numTasks() const override { return 1; }
   std::string taskName(int) const override { return "cart_0"; }
   std::string taskDescription(int) const override { return "a cart"; }
-  std::unique_ptr<pmeta::Env> make(int) const override { return std::make_unique<Cart>(); }
+  std::unique_ptr<pmeta::Env> create(int) const override { return std::make_unique<Cart>(); }
 };
 
 const pmeta::RegisteredFamily<CartFamily> kCart("cart");

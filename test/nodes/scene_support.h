@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pmeta_core/base/settings.h"
-#include "view/scene.h"
+#include "pmeta_nodes/scene.h"
 
 namespace pmeta_nodes {
 namespace test {

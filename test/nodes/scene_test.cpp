@@ -1,4 +1,4 @@
-#include "view/scene.h"
+#include "pmeta_nodes/scene.h"
 
 #include <gtest/gtest.h>
 

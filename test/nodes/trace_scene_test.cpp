@@ -40,7 +40,7 @@ class PlainFamily : public pmeta::EnvFamily {
   int numTasks() const override { return 2; }
   std::string taskName(int task) const override { return "plain_" + std::to_string(task); }
   std::string taskDescription(int) const override { return "nothing to be seen"; }
-  std::unique_ptr<pmeta::Env> make(int) const override {
+  std::unique_ptr<pmeta::Env> create(int) const override {
     return std::make_unique<Plain>(observations_);
   }
 

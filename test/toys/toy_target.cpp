@@ -1,7 +1,7 @@
 // An environment in a file of its own, and its scene: find the action that the task likes.
-#include "draw/figure.h"
 #include "pmeta_core/env/env.h"
-#include "view/scene.h"
+#include "pmeta_nodes/figure.h"
+#include "pmeta_nodes/scene.h"
 
 namespace {
 
@@ -54,7 +54,7 @@ class ToyTargetFamily : public pmeta::EnvFamily {
   std::string taskDescription(int task) const override {
     return "target " + pmeta::formatNumber(targets_.at(task));
   }
-  std::unique_ptr<pmeta::Env> make(int task) const override {
+  std::unique_ptr<pmeta::Env> create(int task) const override {
     return std::make_unique<ToyTarget>(targets_.at(task));
   }
 

@@ -167,7 +167,7 @@ class BrittlePoint : public test::DensePoint {
 class BrittleGoals : public test::OppositeGoals {
  public:
   explicit BrittleGoals(int every) : every_(every) {}
-  std::unique_ptr<Env> make(int) const override { return std::make_unique<BrittlePoint>(every_); }
+  std::unique_ptr<Env> create(int) const override { return std::make_unique<BrittlePoint>(every_); }
 
  private:
   int every_;

@@ -39,7 +39,7 @@ class OppositeGoals : public EnvFamily {
   int numTasks() const override { return 2; }
   std::string taskName(int task) const override { return task == 0 ? "right" : "left"; }
   std::string taskDescription(int task) const override { return taskName(task); }
-  std::unique_ptr<Env> make(int task) const override {
+  std::unique_ptr<Env> create(int task) const override {
     return std::make_unique<DensePoint>(SparsePointTask{task == 0 ? 1.0 : -1.0, 0});
   }
 };

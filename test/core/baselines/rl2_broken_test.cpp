@@ -37,7 +37,7 @@ class BrittlePoint : public test::DensePoint {
 class BrittleGoals : public test::OppositeGoals {
  public:
   BrittleGoals(std::int64_t first, std::int64_t every) : first_(first), every_(every) {}
-  std::unique_ptr<Env> make(int) const override {
+  std::unique_ptr<Env> create(int) const override {
     return std::make_unique<BrittlePoint>(first_, every_);
   }
 

@@ -13,6 +13,7 @@ Rollout::Rollout(std::vector<std::unique_ptr<Env>> envs, AtEnd at_end, int forgi
       broken_(forgiven),
       observation_size_(static_cast<std::size_t>(envs_.front()->spec().observation_size)),
       action_size_(static_cast<std::size_t>(envs_.front()->spec().action_size)),
+      guard_(observation_size_, action_size_),
       seen_(envs_.size() * observation_size_),
       next_seen_(observation_size_),
       observations_(envs_.size() * observation_size_),
@@ -37,7 +38,7 @@ bool Rollout::beginEpisode(std::size_t i, Actor& actor, Rng& rng) {
   for (;;) {
     try {
       returns_[i] = 0;
-      envs_[i]->reset(rng, &observations_[i * observation_size_]);
+      guard_.reset(*envs_[i], rng, &observations_[i * observation_size_]);
       break;
     } catch (const BrokenEpisode& episode) {
       broken_.broke(episode);
@@ -89,7 +90,7 @@ bool Rollout::stepOne(std::size_t row, Actor& actor, Rng& rng, std::int64_t& tra
   double* next = &observations_[i * observation_size_];
   const bool another = at_end_ == AtEnd::kBeginAnother;
   try {
-    steps_[i] = envs_[i]->step(action, rng, next);
+    steps_[i] = guard_.step(*envs_[i], action, rng, next);
   } catch (const BrokenEpisode& episode) {
     broken_.broke(episode);
     return another && beginEpisode(i, actor, rng);

@@ -8,6 +8,8 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
+#include "pmeta_core/base/build.h"
+
 namespace pmeta {
 
 std::map<std::string, std::string> versions() {
@@ -15,7 +17,7 @@ std::map<std::string, std::string> versions() {
     return std::to_string(a) + "." + std::to_string(b) + "." + std::to_string(c);
   };
   return {
-      {"pmeta", PMETA_VERSION},
+      {"pmeta", kVersion},
       {"compiler", __VERSION__},
       {"eigen", dotted(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
       {"hdf5", dotted(H5_VERS_MAJOR, H5_VERS_MINOR, H5_VERS_RELEASE)},

@@ -119,7 +119,7 @@ std::string AntFwdBackFamily::taskDescription(int task) const {
   return "run at an angle of " + formatNumber(angle) + " rad";
 }
 
-std::unique_ptr<Env> AntFwdBackFamily::make(int task) const {
+std::unique_ptr<Env> AntFwdBackFamily::create(int task) const {
   return std::make_unique<Ant>(tasks_.at(task), model_, mujoco_.horizon);
 }
 

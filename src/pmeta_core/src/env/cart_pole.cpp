@@ -118,7 +118,7 @@ std::string CartPoleFamily::taskDescription(int task) const {
          " kg, half length " + formatNumber(t.length) + " m";
 }
 
-std::unique_ptr<Env> CartPoleFamily::make(int task) const {
+std::unique_ptr<Env> CartPoleFamily::create(int task) const {
   return std::make_unique<CartPole>(tasks_.at(task));
 }
 

@@ -150,7 +150,7 @@ std::string GridworldFamily::taskDescription(int task) const {
   return text;
 }
 
-std::unique_ptr<Env> GridworldFamily::make(int task) const {
+std::unique_ptr<Env> GridworldFamily::create(int task) const {
   return std::make_unique<Gridworld>(tasks_.at(task), stride_);
 }
 

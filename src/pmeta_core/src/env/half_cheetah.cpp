@@ -89,7 +89,7 @@ std::string HalfCheetahFamily::taskName(int task) const {
   return splitTaskName(nameOf(tasks_.at(task).goal), task, num_train_);
 }
 
-std::unique_ptr<Env> HalfCheetahFamily::make(int task) const {
+std::unique_ptr<Env> HalfCheetahFamily::create(int task) const {
   return std::make_unique<HalfCheetah>(tasks_.at(task), model_, mujoco_.horizon);
 }
 

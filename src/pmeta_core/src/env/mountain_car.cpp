@@ -105,7 +105,7 @@ std::string MountainCarFamily::taskDescription(int task) const {
          formatNumber(t.gravity);
 }
 
-std::unique_ptr<Env> MountainCarFamily::make(int task) const {
+std::unique_ptr<Env> MountainCarFamily::create(int task) const {
   return std::make_unique<MountainCar>(tasks_.at(task), velocity_scale_);
 }
 

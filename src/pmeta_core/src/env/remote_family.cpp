@@ -171,7 +171,7 @@ std::string RemoteFamily::taskDescription(int task) const {
   return "behind the services of " + serverOf(task);
 }
 
-std::unique_ptr<Env> RemoteFamily::make(int task) const {
+std::unique_ptr<Env> RemoteFamily::create(int task) const {
   if (!connector()) {
     throw Error(
         "environment.name is remote, whose robots are reached over ROS: use ./pmeta run or "

@@ -116,7 +116,7 @@ std::string SparsePointFamily::taskDescription(int task) const {
   return text;
 }
 
-std::unique_ptr<Env> SparsePointFamily::make(int task) const {
+std::unique_ptr<Env> SparsePointFamily::create(int task) const {
   return std::make_unique<SparsePoint>(tasks_.at(task).goal, goal_radius_, horizon_);
 }
 

@@ -108,7 +108,7 @@ std::string Walker2dParamsFamily::taskDescription(int task) const {
          describeWalker2dModel(*t.model, *base_);
 }
 
-std::unique_ptr<Env> Walker2dParamsFamily::make(int task) const {
+std::unique_ptr<Env> Walker2dParamsFamily::create(int task) const {
   return std::make_unique<Walker2d>(tasks_.at(task).model, mujoco_.horizon);
 }
 

@@ -77,6 +77,17 @@ void Experiment::checkLearning() {
   learner_->check();
 }
 
+void Experiment::checkPackage() {
+  const Package& package = family_->package();
+  std::string& version = settings_.package_version;
+  if (version.empty()) version = package.version;
+  if (version == package.version) return;
+  other_package_ = "the settings are of version " + shown(version) + " of the package " +
+                   package.name + ", which is " + shown(package.version) +
+                   " here: what is learnt and how policies do may differ.";
+  notes_.push_back("warning: " + other_package_);
+}
+
 void Experiment::checkStability() {
   const PersonalSettings& p = settings_.personal;
   const std::optional<double> gamma = learner_->linearDiscount();

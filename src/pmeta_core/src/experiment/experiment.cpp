@@ -66,7 +66,7 @@ void Experiment::copyModel() const {
 
 std::string Experiment::describe() const {
   Experiment defaults;
-  defaults.family_ = envFamilies().at(settings_.environment)();
+  defaults.family_ = makeFamily(settings_.environment);
   const YAML::Node effective = parseYaml(yaml_, "the settings");
   defaults.family_->outline(listedSettings(effective));
   Settings settings;

@@ -206,8 +206,8 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   Experiment experiment;
   experiment.chooseKinds(peek(files, overrides, "", "algorithm", experiment.settings_.algorithm),
                          peek(files, overrides, "", "learner", experiment.settings_.learner));
-  experiment.family_ = envFamilies().at(
-      peek(files, overrides, "environment", "name", experiment.settings_.environment))();
+  experiment.family_ =
+      makeFamily(peek(files, overrides, "environment", "name", experiment.settings_.environment));
 
   experiment.family_->outline(environmentSettings(files, overrides));
   if (experiment.hasMetaLearner()) {
@@ -237,6 +237,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   experiment.checkAggregation();
   experiment.checkBodies();
   experiment.checkLearning();
+  experiment.checkPackage();
   e.results_dir = expandResultsDir(e.results_dir);
   if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
   if (!e.library.empty()) e.library = absolutePath("library", e.library);

@@ -169,7 +169,7 @@ std::string MjcfFamily::taskName(int task) const { return splitTaskName("task", 
 
 std::string MjcfFamily::taskDescription(int task) const { return tasks_.at(task).description; }
 
-std::unique_ptr<Env> MjcfFamily::make(int task) const {
+std::unique_ptr<Env> MjcfFamily::create(int task) const {
   const Task& made = tasks_.at(task);
   return std::make_unique<MjcfEnv>(made.design, made.model);
 }

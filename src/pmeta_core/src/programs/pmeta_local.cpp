@@ -341,6 +341,7 @@ int evaluate(const Arguments& arguments) {
                 std::to_string(experiment.totalTasks() - 1) + ".");
   }
   std::cout << policy.description() << std::endl;
+  printNotes(experiment);
   const int only = arguments.task < 0 ? policy.task() : arguments.task;
   const pmeta::PolicyEvaluation evaluation(policy);
   for (int task = 0; task < experiment.totalTasks(); ++task) {
@@ -389,9 +390,8 @@ int main(int argc, char** argv) {
   pmeta::prepareProcess();
   try {
     const int code = dispatch(argc, argv);
-    if (!pmeta::standardOutputIsWhole()) {
+    if (!pmeta::standardOutputIsWhole())
       throw Error("standard output cannot be written: is its disk full?");
-    }
     return code;
   } catch (const std::exception& error) {
     std::cerr << "pmeta: " << error.what() << std::endl;

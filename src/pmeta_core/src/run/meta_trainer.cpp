@@ -7,6 +7,7 @@
 #include "pmeta_core/adapt/adapted_return.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/stopwatch.h"
+#include "pmeta_core/env/faulty_env.h"
 #include "pmeta_core/run/divergence.h"
 
 namespace pmeta {
@@ -37,6 +38,8 @@ auto MetaTrainer::guarded(int round, const Work& work) const {
     return work();
   } catch (const TaskFailed&) {
     throw;
+  } catch (const FaultyEnv& fault) {
+    throw TaskFailed("round " + std::to_string(round) + " failed: " + fault.what());
   } catch (const BrokenEpisode& episode) {
     fail(round, episode.reason(), simulationSettings(experiment_));
   } catch (const Error& error) {

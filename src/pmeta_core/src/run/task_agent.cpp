@@ -6,6 +6,7 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/stopwatch.h"
+#include "pmeta_core/env/faulty_env.h"
 #include "pmeta_core/storage/policy_file.h"
 
 namespace pmeta {
@@ -40,6 +41,8 @@ auto TaskAgent::guarded(int round, const Work& work) const {
     return work();
   } catch (const TaskFailed&) {
     throw;
+  } catch (const FaultyEnv& fault) {
+    throw TaskFailed("round " + std::to_string(round) + " failed: " + fault.what());
   } catch (const LostEnvironment& lost) {
     throw TaskFailed(name_ + " failed in round " + std::to_string(round) + ": " + lost.what());
   } catch (const BrokenEpisode& episode) {

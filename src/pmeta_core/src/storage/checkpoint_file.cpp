@@ -30,9 +30,9 @@ void checkFile(const std::string& path) {
   std::memcpy(&version, &block[kVersionAt], sizeof version);
   std::memcpy(&claimed, &block[kLengthAt], sizeof claimed);
   if (n < static_cast<ssize_t>(kUserBlock)) refuseFile(path, "it is cut off");
-  if (version != kVersion) {
+  if (version != kCheckpointVersion) {
     refuseFile(path, "it is of version " + std::to_string(version) + " of the format, not " +
-                         std::to_string(kVersion) +
+                         std::to_string(kCheckpointVersion) +
                          ": go on with the pMeta that wrote it, or begin the run anew");
   }
   if (static_cast<std::uint64_t>(length) != claimed) {

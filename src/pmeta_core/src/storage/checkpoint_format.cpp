@@ -60,7 +60,7 @@ bool hashOf(int fd, Hash& hash) {
 UserBlock userBlockOf(std::uint64_t length, const Hash& hash) {
   UserBlock block{};
   std::memcpy(block.data(), kMagic, kVersionAt);
-  std::memcpy(&block[kVersionAt], &kVersion, sizeof kVersion);
+  std::memcpy(&block[kVersionAt], &kCheckpointVersion, sizeof kCheckpointVersion);
   std::memcpy(&block[kLengthAt], &length, sizeof length);
   std::memcpy(&block[kHashAt], hash.data(), kHashBytes);
   return block;

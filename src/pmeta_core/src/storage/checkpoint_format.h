@@ -17,7 +17,7 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "checkpoints are little
 
 constexpr std::size_t kUserBlock = 512;
 constexpr char kMagic[] = "pMetaCkp";
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kCheckpointVersion = 2;
 constexpr std::size_t kHashBytes = 32;
 
 // where the numbers of the user block are

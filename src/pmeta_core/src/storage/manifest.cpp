@@ -113,6 +113,9 @@ std::string constantManifest(const Experiment& experiment, const std::string& st
   manifest["defining_settings"] = experiment.definingSettings();
   manifest["settings_hash"] = experiment.settingsHash();
   if (experiment.model() != nullptr) manifest["model_hash"] = experiment.model()->hash;
+  if (const Package& package = experiment.family().package(); !package.name.empty()) {
+    manifest["package"] = package.name + " " + package.version;
+  }
   manifest["figures"] = figures(experiment);
   manifest["commit"] = commit();
   manifest["versions"] = versions();

@@ -207,7 +207,7 @@ KnownTasks makeKnownTasks(const ConvergenceSettings& settings, const std::string
   if (slip.empty()) {
     slip = spread ? spreadSlip(settings.slip_spread, settings.sizes.size()) : settings.slip;
   }
-  const std::unique_ptr<EnvFamily> family = envFamilies().at(settings.environment)();
+  const std::unique_ptr<EnvFamily> family = makeFamily(settings.environment);
   Settings bound;
   family->bind(bound);
   bound.assign("environment.sizes:=" + listText(settings.sizes));

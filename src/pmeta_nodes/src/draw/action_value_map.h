@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "draw/scene_parts.h"
+#include "pmeta_nodes/scene_parts.h"
 
 namespace pmeta_nodes {
 

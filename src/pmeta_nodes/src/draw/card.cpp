@@ -1,4 +1,4 @@
-#include "draw/card.h"
+#include "pmeta_nodes/card.h"
 
 #include <algorithm>
 #include <cmath>

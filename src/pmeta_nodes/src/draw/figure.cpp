@@ -1,4 +1,4 @@
-#include "draw/figure.h"
+#include "pmeta_nodes/figure.h"
 
 #include <algorithm>
 

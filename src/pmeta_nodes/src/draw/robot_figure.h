@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "draw/figure.h"
 #include "pmeta_core/env/mujoco_kinematics.h"
+#include "pmeta_nodes/figure.h"
 
 namespace pmeta_nodes {
 

@@ -1,4 +1,4 @@
-#include "draw/scene_parts.h"
+#include "pmeta_nodes/scene_parts.h"
 
 #include <algorithm>
 

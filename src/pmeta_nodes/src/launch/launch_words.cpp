@@ -1,5 +1,7 @@
 #include "launch/launch_words.h"
 
+#include <ros/package.h>
+
 #include <algorithm>
 #include <regex>
 #include <sstream>
@@ -17,6 +19,7 @@ using pmeta::Error;
 using pmeta::shown;
 
 const char kBlanks[] = " \t\n\r";
+const char kOfPmeta[] = "<include file=\"$(find pmeta_nodes)/launch/";
 
 std::string trim(const std::string& text) {
   const auto begin = text.find_first_not_of(kBlanks);
@@ -66,26 +69,36 @@ std::size_t endOfValue(const std::string& text, std::size_t begin) {
               " does not end: close its bracket or quote.");
 }
 
-// the launch file that roslaunch was called with, if it is one of the folder; else ""
+// The launch file that roslaunch was called with, if it is one of the folder, or another's that
+// includes one of it; else "".
 fs::path launchFileOf(const std::vector<std::string>& command, const fs::path& folder) {
   for (std::size_t i = 1; i < command.size(); ++i) {
     if (fs::path(command[i]).extension() != ".launch") continue;
     if (command[i - 1] == "pmeta_nodes") return folder / command[i];
     std::error_code error;
-    const fs::path file = fs::weakly_canonical(command[i], error);
+    fs::path file = fs::weakly_canonical(command[i], error);
     if (file.parent_path() == fs::weakly_canonical(folder, error)) return file;
+    if (!fs::is_regular_file(file, error)) {
+      file = fs::path(ros::package::getPath(command[i - 1])) / "launch" / command[i];
+      if (!fs::is_regular_file(file, error)) return "";
+    }
+    const std::string text = pmeta::readFile(file.string(), "the launch file");
+    return text.find(kOfPmeta) == std::string::npos ? "" : file;
   }
   return "";
 }
 
 }  // namespace
 
-LaunchArguments readLaunchFile(const fs::path& file) {
+LaunchArguments readLaunchFile(const fs::path& file, const fs::path& folder) {
   std::string text = pmeta::readFile(file.string(), "the launch file");
-  std::set<std::string> included;
-  collect(text, "<include file=\"\\$\\(dirname\\)/([^\"]+)\"", included);
-  for (const std::string& name : included)
+  std::set<std::string> beside, of_pmeta;
+  collect(text, "<include file=\"\\$\\(dirname\\)/([^\"]+)\"", beside);
+  collect(text, "<include file=\"\\$\\(find pmeta_nodes\\)/launch/([^\"]+)\"", of_pmeta);
+  for (const std::string& name : beside)
     text += pmeta::readFile(file.parent_path() / name, "the launch file");
+  for (const std::string& name : of_pmeta)
+    text += pmeta::readFile(folder / name, "the launch file");
   LaunchArguments arguments;
   collect(text, "<arg name=\"([^\"]+)\"", arguments.names);
   collect(text, "\\b([a-z_]+):=\\$\\(arg \\1\\)", arguments.handed_on);
@@ -152,7 +165,7 @@ std::vector<std::string> wordsOfLaunch(const std::string& lines,
       // names that begin with _ are roslaunch's own, e.g. __log
       if (word.find(":=") != std::string::npos && word[0] != '_') words.push_back(word);
     }
-    given = handedOn(words, readLaunchFile(file));
+    given = handedOn(words, readLaunchFile(file, folder));
   }
   std::vector<std::string> words;
   std::istringstream in(lines);

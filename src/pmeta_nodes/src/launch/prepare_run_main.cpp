@@ -236,6 +236,12 @@ Experiment checkedExperiment(const std::string& config, std::vector<std::string>
   Experiment experiment = resume.empty() ? Experiment::load(config, assignments)
                                          : Experiment::resume(resume, assignments, config);
   const pmeta::Authenticator probe(experiment.settings().key_file);
+  // what a package's environments cannot do is told here, and not by agents that start again and
+  // again
+  const bool foreign = !experiment.family().package().name.empty();
+  for (int task = 0; foreign && task < experiment.totalTasks(); ++task) {
+    experiment.family().make(task);
+  }
   if (resume.empty()) {
     pmeta::requireWritable(experiment.settings().results_dir + "/" +
                            experiment.settings().experiment);
@@ -256,7 +262,8 @@ int check(const std::vector<std::string>& words) {
   if (words.size() < 2)
     throw Error("--check needs LAUNCH_FILE and CONFIG; see prepare_run --help.");
   std::vector<std::string> assignments = readAssignments(pmeta_nodes::handedOn(
-      {words.begin() + 2, words.end()}, pmeta_nodes::readLaunchFile(words[0])));
+      {words.begin() + 2, words.end()},
+      pmeta_nodes::readLaunchFile(words[0], std::filesystem::path(words[0]).parent_path())));
   takeLaunch(assignments);
   const Experiment experiment = checkedExperiment(words[1], assignments);
   std::cout << experiment.runDir() << "\n" << partyNodes(experiment).size() << "\n";

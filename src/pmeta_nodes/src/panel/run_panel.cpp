@@ -22,7 +22,7 @@
 #include <cmath>
 
 #include "pmeta_core/base/format.h"
-#include "view/scene.h"
+#include "pmeta_nodes/scene.h"
 
 namespace pmeta_nodes {
 namespace {

@@ -15,6 +15,8 @@ PolicyNode::PolicyNode(const std::string& path, int task, bool explores, std::ui
                        " is the personal policy of task " + std::to_string(policy_.task()) +
                        ": leave the parameter out.");
   }
+  const std::string& other_package = policy_.experiment().otherPackage();
+  if (!other_package.empty()) ROS_WARN("%s", other_package.c_str());
   const std::string description = policy_.description();
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
   action_.data.resize(static_cast<std::size_t>(policy_.spec().action_size));

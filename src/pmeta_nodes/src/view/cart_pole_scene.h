@@ -1,7 +1,7 @@
 #pragma once
 
-#include "draw/card.h"
 #include "pmeta_core/env/cart_pole.h"
+#include "pmeta_nodes/card.h"
 
 namespace pmeta_nodes {
 

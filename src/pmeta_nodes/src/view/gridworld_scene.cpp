@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "draw/scene_parts.h"
+#include "pmeta_nodes/scene_parts.h"
 
 namespace pmeta_nodes {
 namespace {

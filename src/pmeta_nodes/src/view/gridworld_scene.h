@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "pmeta_core/env/gridworld.h"
-#include "view/scene.h"
+#include "pmeta_nodes/scene.h"
 
 namespace pmeta_nodes {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "draw/card.h"
 #include "pmeta_core/env/mountain_car.h"
+#include "pmeta_nodes/card.h"
 
 namespace pmeta_nodes {
 

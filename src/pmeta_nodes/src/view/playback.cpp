@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "view/scene.h"
+#include "pmeta_nodes/scene.h"
 
 namespace pmeta_nodes {
 

@@ -5,9 +5,9 @@
 #include <optional>
 #include <utility>
 
-#include "draw/card.h"
 #include "draw/robot_figure.h"
 #include "pmeta_core/env/mujoco_view.h"
+#include "pmeta_nodes/card.h"
 
 namespace pmeta_nodes {
 

@@ -23,6 +23,8 @@ double meanOf(const std::vector<pmeta_msgs::TaskReturn>& returns, int policy, in
 }  // namespace
 
 ShowRun::ShowRun(ros::NodeHandle nh, const pmeta::FinishedRun& run) : run_(run) {
+  const std::string& other_package = run.experiment().otherPackage();
+  if (!other_package.empty()) ROS_WARN("%s", other_package.c_str());
   advertise(nh);
   summarise();
 }

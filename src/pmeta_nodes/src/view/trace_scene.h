@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "draw/card.h"
 #include "pmeta_core/env/env_spec.h"
+#include "pmeta_nodes/card.h"
 
 namespace pmeta_nodes {
 

@@ -10,8 +10,8 @@
 #include <tf2_ros/static_transform_broadcaster.h>
 
 #include "common/recent_returns.h"
+#include "pmeta_nodes/scene.h"
 #include "view/playback.h"
-#include "view/scene.h"
 
 namespace pmeta_nodes {
 

@@ -8,6 +8,7 @@
 
 #include "pmeta_core/act/actor.h"
 #include "pmeta_core/act/broken_episodes.h"
+#include "pmeta_core/act/step_guard.h"
 
 namespace pmeta {
 
@@ -28,7 +29,7 @@ class Rollout {
   /// after the other. With kBeginAnother, an episode that somebody else has ended, or that could
   /// not be restored, makes place for another first. Of a step that breaks its episode nothing is
   /// kept. Returns the transitions. Allocates nothing. Throws Error where the actor knows no
-  /// action.
+  /// action, FaultyEnv as StepGuard does.
   std::int64_t step(Actor& actor, Rng& rng);
 
   bool running() const { return !running_.empty(); }  ///< does any episode go on?
@@ -66,6 +67,7 @@ class Rollout {
   BrokenEpisodes broken_;
   std::size_t observation_size_;
   std::size_t action_size_;
+  StepGuard guard_;
   std::vector<std::size_t> running_;  // environments whose episode goes on, ascending
   std::vector<float> seen_;           // where those are, packed: what the actor looks at
   std::vector<float> next_seen_;      // of one environment

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "pmeta_core/base/build.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/names.h"
 
@@ -20,9 +21,9 @@ class Registry {
   /// `kind`: what a row is, for errors, e.g. "environment".
   explicit Registry(std::string kind) : kind_(std::move(kind)) {}
 
-  /// Throws std::logic_error if the name is taken.
-  void add(const std::string& name, Row row) {
-    if (!rows_.emplace(name, std::move(row)).second) {
+  /// `package`: that it is of. Throws std::logic_error if the name is taken.
+  void add(const std::string& name, Row row, Package package = {}) {
+    if (!rows_.emplace(name, Entry{std::move(row), std::move(package)}).second) {
       throw std::logic_error("two of kind " + kind_ + " have the name '" + name + "'");
     }
   }
@@ -36,7 +37,13 @@ class Registry {
   /// Null if there is none of that name.
   const Row* find(const std::string& name) const {
     const auto found = rows_.find(name);
-    return found == rows_.end() ? nullptr : &found->second;
+    return found == rows_.end() ? nullptr : &found->second.row;
+  }
+
+  /// Which package the row of that name is of. Throws as at() does.
+  const Package& package(const std::string& name) const {
+    at(name);
+    return rows_.at(name).package;
   }
 
   /// Ascending.
@@ -47,16 +54,32 @@ class Registry {
   }
 
  private:
+  struct Entry {
+    Row row;
+    Package package;
+  };
+
   std::string kind_;
-  std::map<std::string, Row> rows_;
+  std::map<std::string, Entry> rows_;
 };
+
+/// While a library is being loaded, from where no exception gets out: notes why it must not be, for
+/// loadLibrary() to throw. Otherwise throws std::logic_error.
+void refuseRow(const std::string& why);
 
 /// A row that is in a registry from the program's (or library's) start on.
 template <class Row>
 struct Registered {
-  /// Adds the row under `name`; see Registry::add().
-  Registered(Registry<Row>& registry, const std::string& name, Row row) {
-    registry.add(name, std::move(row));
+  /// Adds the row under `name`, unless that is taken or the library does not fit: see refuseRow().
+  /// `build` is the caller's, whose code this may not be.
+  Registered(Registry<Row>& registry, const std::string& name, Row row,
+             const Build& build = kThisBuild) {
+    try {
+      if (const std::string why = misfit(build); !why.empty()) throw std::logic_error(why);
+      registry.add(name, std::move(row), {build.package, build.package_version});
+    } catch (const std::logic_error& error) {
+      refuseRow(error.what());
+    }
   }
 };
 

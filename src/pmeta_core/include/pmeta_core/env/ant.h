@@ -69,7 +69,7 @@ class AntFwdBackFamily : public EnvFamily {
   ModelChoice* model() override { return &mujoco_.model; }
   std::string taskName(int task) const override;
   std::string taskDescription(int task) const override;
-  std::unique_ptr<Env> make(int task) const override;
+  std::unique_ptr<Env> create(int task) const override;
 
   /// Direction of a training or test task, rad; throws std::out_of_range if there is none.
   double angle(int task) const { return tasks_.at(task); }

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -90,6 +91,17 @@ class Env {
   void saveState(StateWriter& writer) const;
   /// Goes on from what saveState() wrote of the same task; throws as setState() does.
   void loadState(StateReader& reader);
+
+  /// What it is, for errors: "environment 'my_package/Arm' (my_package 1.0.0) of task 1 (heavy)",
+  /// or less where less is known.
+  std::string description() const;
+  /// Is it of another package than pMeta?
+  bool isForeign() const { return foreign_; }
+
+ private:
+  friend class EnvFamily;
+  std::string made_as_;  // by a family, see description()
+  bool foreign_ = false;
 };
 
 /// Throws Error unless `state` holds `size` finite numbers of which the last counts steps; for
@@ -138,14 +150,38 @@ class EnvFamily {
   /// What sets the task apart, e.g. "4x4 cells, landmark at (3,3)"; for manifests and people.
   virtual std::string taskDescription(int task) const = 0;
 
-  /// A new environment of that task. The family must outlive it.
-  virtual std::unique_ptr<Env> make(int task) const = 0;
+  /// A new environment of that task. The family must outlive it. Throws FaultyEnv if it cannot be
+  /// made, is described wrongly, or has other sizes than those of other tasks.
+  std::unique_ptr<Env> make(int task) const;
 
   /// Is each task one body, as a robot is, of which no two environments may be at a time?
   virtual bool hasOneBody() const { return false; }
 
   /// What its environments have met with so far, for people: name and figure. From any thread.
   virtual std::vector<std::pair<std::string, std::string>> figures() const { return {}; }
+
+  /// The package that it is of.
+  const Package& package() const { return package_; }
+
+ protected:
+  /// What make() gives.
+  virtual std::unique_ptr<Env> create(int task) const = 0;
+
+ private:
+  // of the environments of all tasks; shared by copies
+  struct Sizes {
+    std::once_flag known;
+    int observation = 0, action = 0, actions = 0;
+  };
+
+  friend std::unique_ptr<EnvFamily> makeFamily(const std::string& name);
+  std::unique_ptr<Env> created(int task) const;
+  std::string describe(int task) const;
+  void requireSizes(int task, const EnvSpec& spec) const;
+
+  std::string name_;  // of its row; "" if it was made without
+  Package package_;
+  std::shared_ptr<Sizes> sizes_ = std::make_shared<Sizes>();
 };
 
 /// `count` environments: make(0), make(1), ...
@@ -155,8 +191,13 @@ std::vector<std::unique_ptr<Env>> makeEnvs(const std::function<std::unique_ptr<E
 /// Makes a family with its default settings.
 using EnvFamilyMaker = std::function<std::unique_ptr<EnvFamily>()>;
 
-/// Every family, by the name that `environment.name` gives.
+/// Every family, by the name that `environment.name` gives; that of a family of another package is
+/// "my_package/MyFamily".
 Registry<EnvFamilyMaker>& envFamilies();
+
+/// The family of that name, with its default settings; one of a package that is not loaded yet is
+/// looked for. Throws Error if there is none.
+std::unique_ptr<EnvFamily> makeFamily(const std::string& name);
 
 /// In the source of a family, outside of any function:
 ///

@@ -63,7 +63,7 @@ class GridworldFamily : public EnvFamily {
   int numTasks() const override { return static_cast<int>(tasks_.size()); }
   std::string taskName(int task) const override;
   std::string taskDescription(int task) const override;
-  std::unique_ptr<Env> make(int task) const override;
+  std::unique_ptr<Env> create(int task) const override;
 
   /// Size, landmark and slip of a task; throws std::out_of_range if there is none.
   const GridworldTask& task(int task) const { return tasks_.at(task); }

@@ -67,7 +67,7 @@ class HalfCheetahFamily : public EnvFamily {
   int numTestTasks() const override { return static_cast<int>(tasks_.size()) - num_train_; }
   ModelChoice* model() override { return &mujoco_.model; }
   std::string taskName(int task) const override;
-  std::unique_ptr<Env> make(int task) const override;
+  std::unique_ptr<Env> create(int task) const override;
 
   /// A training or test task; throws std::out_of_range if there is none.
   const HalfCheetahTask& task(int task) const { return tasks_.at(task); }

@@ -55,7 +55,7 @@ class MountainCarFamily : public EnvFamily {
   int numTasks() const override { return static_cast<int>(tasks_.size()); }
   std::string taskName(int task) const override;
   std::string taskDescription(int task) const override;
-  std::unique_ptr<Env> make(int task) const override;
+  std::unique_ptr<Env> create(int task) const override;
 
   /// Throws std::out_of_range if there is no such task.
   const MountainCarTask& task(int task) const { return tasks_.at(task); }

@@ -36,7 +36,7 @@ class RemoteFamily : public EnvFamily {
   std::string taskName(int task) const override;
   std::string taskDescription(int task) const override;
   /// Throws Error in a program that cannot reach bodies.
-  std::unique_ptr<Env> make(int task) const override;
+  std::unique_ptr<Env> create(int task) const override;
   bool hasOneBody() const override { return true; }
   std::vector<std::pair<std::string, std::string>> figures() const override;
 

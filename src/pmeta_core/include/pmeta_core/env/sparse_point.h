@@ -53,7 +53,7 @@ class SparsePointFamily : public EnvFamily {
   int numTestTasks() const override { return static_cast<int>(tasks_.size()) - num_train_; }
   std::string taskName(int task) const override;
   std::string taskDescription(int task) const override;
-  std::unique_ptr<Env> make(int task) const override;
+  std::unique_ptr<Env> create(int task) const override;
 
   /// Goal of a training or test task; throws std::out_of_range if there is none.
   const SparsePointTask& task(int task) const { return tasks_.at(task).goal; }

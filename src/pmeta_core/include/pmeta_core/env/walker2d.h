@@ -78,7 +78,7 @@ class Walker2dParamsFamily : public EnvFamily {
   ModelChoice* model() override { return &mujoco_.model; }
   std::string taskName(int task) const override;
   std::string taskDescription(int task) const override;
-  std::unique_ptr<Env> make(int task) const override;
+  std::unique_ptr<Env> create(int task) const override;
 
   /// Factors of a training or test task; throws std::out_of_range if there is none.
   const Walker2dTask& task(int task) const { return tasks_.at(task).factors; }

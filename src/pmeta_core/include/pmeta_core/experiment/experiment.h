@@ -141,6 +141,9 @@ class Experiment {
   std::string describe() const;
   /// Notes and warnings about the settings, one sentence each.
   const std::vector<std::string>& notes() const { return notes_; }
+  /// What to say where the environment's package is of another version than the settings were made
+  /// with, in a sentence; "" where it is not. Among the notes(), too.
+  const std::string& otherPackage() const { return other_package_; }
 
  private:
   // shared by copies: computed once
@@ -164,6 +167,7 @@ class Experiment {
   void checkBodies() const;
   void checkLearning();
   void checkStability();
+  void checkPackage();
 
   ExperimentSettings settings_;
   const Algorithm* algorithm_ = nullptr;
@@ -176,6 +180,7 @@ class Experiment {
   std::string run_yaml_;
   std::string table_;
   std::vector<std::string> notes_;
+  std::string other_package_;
 };
 
 /// The first key that only one of both has, or has with another value; "" if they are equal.

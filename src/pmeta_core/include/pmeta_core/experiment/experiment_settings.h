@@ -52,6 +52,7 @@ struct ExperimentSettings {
   PersonalSettings personal;    ///< step sizes and pull
   AggregationSettings aggregation;        ///< mixing and waiting
   std::string environment = "gridworld";  ///< a name of envFamilies()
+  std::string package_version;  ///< of the environment's package, when the run began; "" as it is
 };
 
 }  // namespace pmeta

@@ -21,7 +21,7 @@ class MjcfFamily : public EnvFamily {
   ModelChoice* model() override { return &design_.model; }
   std::string taskName(int task) const override;
   std::string taskDescription(int task) const override;
-  std::unique_ptr<Env> make(int task) const override;
+  std::unique_ptr<Env> create(int task) const override;
 
  private:
   struct Task {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "draw/scene_parts.h"
+#include "pmeta_nodes/scene_parts.h"
 
 namespace pmeta_nodes {
 

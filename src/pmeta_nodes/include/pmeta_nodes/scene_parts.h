@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "draw/figure.h"
-#include "view/scene.h"
+#include "pmeta_nodes/figure.h"
+#include "pmeta_nodes/scene.h"
 
 namespace pmeta_nodes {
 
