@@ -12,18 +12,6 @@
 
 . "$TOP/tools/launch.sh"
 
-# the folder with the policies that a word means
-policies_of() {
-  local shipped=$TOP/config/policies
-  if [ -d "$1" ]; then
-    realpath "$1"
-  elif [ -d "$shipped/$1" ]; then
-    echo "$shipped/$1"
-  else
-    die "'$1' is neither the folder of a run nor a set with shipped policies, which are: $(find "$shipped" -mindepth 1 -maxdepth 1 -type d -printf '%f\n' | sort | xargs)."
-  fi
-}
-
 command_main() {
   [ $# -ge 1 ] || die "which policies? See ./pmeta show --help."
   local folder
