@@ -13,7 +13,7 @@ from programs import LOCAL, TOP, environment, run
 CONFIG = TOP / "examples/remote/cart_pole.yaml"
 
 
-def wait_for(condition, seconds=40):
+def wait_for(condition, seconds=90):
     limit = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < limit, "it did not come to that in time"
@@ -78,6 +78,7 @@ class Processes:
     def __init__(self, folder):
         self.folder = folder
         self.env = environment(folder)
+        self.run = folder / "remote_cart_pole/run"
         self.started = []
 
     def start(self, *words, **variables):
@@ -90,10 +91,10 @@ class Processes:
 
     def launch(self, *assignments):
         return self.start("roslaunch", "--skip-log-check", "pmeta_nodes", "experiment.launch",
-                          "config:=%s" % CONFIG, "results_dir:=%s" % self.folder, "run_id:=run", *assignments)
+                          "config:=%s" % CONFIG, "results_dir:=%s" % self.folder, *assignments)
 
     def status(self):
-        manifest = self.folder / "remote_cart_pole/run/manifest.json"
+        manifest = self.run / "manifest.json"
         return yaml.safe_load(manifest.read_text())["status"] if manifest.exists() else None
 
     def servers(self):
@@ -111,7 +112,7 @@ def processes(tmp_path):
             process.wait()
 
 
-def test_a_run_on_servers_in_python_that_describe_themselves(processes):
+def test_a_run_on_servers_in_python_goes_on_where_it_was_stopped(processes):
     processes.start("roscore", "-p", processes.env["ROS_MASTER_URI"].rsplit(":", 1)[1])
     processes.servers()
     told = []
@@ -123,16 +124,26 @@ def test_a_run_on_servers_in_python_that_describe_themselves(processes):
     wait_for(describes)
     section = yaml.safe_load(told[-1].stdout)["environment"]
     assert section == yaml.safe_load(CONFIG.read_text())["environment"]
-    launched, log = processes.launch("rounds:=2", "settings:=updates_per_round=30 evaluation_interval=2")
-    assert launched.wait(60) == 0
+
+    settings = "settings:=updates_per_round=30 evaluation_interval=3 checkpoint.interval=1"
+    launched, log = processes.launch(settings, "run_id:=run", "rounds:=9", "pace:=0.5")
+    wait_for(lambda: list(processes.run.glob("checkpoint/aggregator*")))
+    os.killpg(launched.pid, signal.SIGINT)
+    launched.wait(60)
+    assert processes.status() == "stopped", log.read_text()
+    launched, log = processes.launch("resume:=%s" % processes.run, "pace:=0")
+    assert launched.wait(100) == 0
     assert processes.status() == "finished", log.read_text()
+    for task in range(2):
+        assert ("cart_pole_%d begins a new episode: the one it was in cannot be restored." % task
+                in log.read_text())
 
 
 def test_a_run_that_waits_for_a_robot_says_so_and_can_be_stopped(processes):
-    launched, log = processes.launch()
+    launched, log = processes.launch("run_id:=run")
     wait_for(lambda: "waiting for the services of /cart_pole_0" in log.read_text())
     os.killpg(launched.pid, signal.SIGINT)
-    launched.wait(20)
+    launched.wait(60)
     assert processes.status() == "stopped", log.read_text()
     assert "FATAL" not in log.read_text() and "escalating" not in log.read_text()
 

@@ -22,6 +22,9 @@ TEST_F(RunOverRos, AServerThatIsKilledTenTimesCostsTheEpisodesThatItWasIn) {
     ASSERT_TRUE(waitFor([&] { return (pid = pidOf(server)) > 1 && pid != before; })) << kills;
     ASSERT_EQ(kill(pid, SIGKILL), 0);
   }
+  // the agent itself: it goes on from its checkpoint, but not with the episode that it was in
+  ASSERT_TRUE(waitFor([&] { return roundsDone() > kKills; }));
+  ASSERT_EQ(kill(pidOf("/pmeta/task_agent_0"), SIGKILL), 0);
   EXPECT_FALSE(finished()) << "the run was over before the last kill";
   ASSERT_TRUE(waitFor([&] { return finished(); }));
   EXPECT_EQ(roundsDone(), experiment_.settings().rounds);

@@ -267,6 +267,30 @@ TEST(RemoteFamily, ABodyHasOneEnvironmentAndOneAgent) {
       "environment 'remote' has one body for each task, but dqn.num_envs is 10: set it to 1.");
 }
 
+TEST(RemoteFamily, AnAgentTrainsEvaluatesAndRecordsInTheOneBody) {
+  Scripted::Script script;
+  int links = 0;
+  RemoteFamily::connector() = [&](const std::string&, const auto&, const auto&, auto&) {
+    ++links;
+    return std::make_unique<Scripted>(script);
+  };
+  const auto learner = remote({"sac.hidden:=[4]", "sac.batch_size:=8", "sac.warm_up_steps:=20",
+                               "sac.evaluation_episodes:=3"})
+                           .makeLearner(0);
+  Rng rng(1, 0, Stream::kMeasure);
+  learner->beginRound(learner->initialModel(0), false);
+  EXPECT_EQ(links, 0) << "nobody has acted yet";
+  learner->update(rng);
+  EXPECT_EQ(script.seeds.size(), 1u);
+  EXPECT_EQ(learner->evaluate(learner->personal(), rng).episodes, 3);
+  learner->record(learner->personal(), rng);
+  EXPECT_EQ(script.seeds.size(), 1u + 3 + 1);
+  EXPECT_EQ(learner->update(rng).broken_episodes, 0);
+  EXPECT_EQ(script.seeds.size(), 6u) << "the training episode was cut short: another has begun";
+  EXPECT_EQ(links, 1);
+  RemoteFamily::connector() = nullptr;
+}
+
 TEST(RemoteFamily, AProgramWithoutRosSaysThatItNeedsIt) {
   EXPECT_EQ(errorOf([] { remote({}).makeLearner(0); }),
             "environment.name is remote, whose robots are reached over ROS: use ./pmeta run or "

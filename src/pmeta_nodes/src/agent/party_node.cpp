@@ -278,9 +278,10 @@ void PartyNode::returnTo(const pmeta::MetaPolicy& meta) {
   for (const std::string& sentence : refused) ROS_WARN("%s", sentence.c_str());
   saved_round_ = round;
   if (round > 0) {
-    const bool restorable = experiment_.family().make(tasks_.front())->spec().restorable;
-    ROS_INFO("%s goes on after round %d%s.", name_.c_str(), round,
-             restorable ? "" : ", with a new episode: the last one cannot be restored");
+    ROS_INFO("%s goes on after round %d.", name_.c_str(), round);
+    if (!experiment_.family().make(tasks_.front())->spec().restorable) {
+      ROS_WARN("%s begins a new episode: the one it was in cannot be restored.", name_.c_str());
+    }
   }
   if (round < meta.round) {
     ROS_WARN("%s has lost what it learnt in the rounds %d to %d: no good checkpoint is newer.",
