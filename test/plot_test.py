@@ -137,7 +137,7 @@ def test_sweep_points_show_mean_and_interval(tmp_path, sweep):
 
 
 def test_the_colours_of_the_policies_are_those_of_rviz():
-    with open(os.path.join(SCRIPTS, "..", "src", "draw", "scene_parts.h"), encoding="utf-8") as file:
+    with open(os.path.join(SCRIPTS, "..", "include", "pmeta_nodes", "scene_parts.h"), encoding="utf-8") as file:
         text = file.read()
     for name, color in (("kPersonal", pd.PP_COLOR), ("kMeta", pd.MP_COLOR)):
         assert "%s = rgb(0x%s)" % (name, color[1:].lower()) in text

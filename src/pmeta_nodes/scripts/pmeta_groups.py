@@ -163,7 +163,8 @@ def group_runs(runs):
         groups.sort(key=lambda g: (g.figures.order, g.algorithm,
                                    [sort_key(g.settings.get(k)) for k in keys]))
         for group in groups:
-            group.label = " ".join([group.label] + setting_texts(group, keys))
+            group.label = " ".join([group.label] + setting_texts(
+                group, [key for key in keys if not _goes_without_saying(group, key, groups)]))
             for known, what, returns in (
                     ([bool(r.fresh) for r in group.runs], "final.csv", "fresh"),
                     ([(OWN_BEST, "personal") in r.fresh for r in group.runs if r.fresh],
@@ -233,6 +234,15 @@ def varying(groups):
     return [key for key in keys if len(set(
         group.settings.get(key) for group in groups
         if key not in group.unused)) > 1]
+
+
+def _goes_without_saying(group, key, groups):
+    """Is a group's value that of most groups, and of all of its algorithm?"""
+    value = group.settings.get(key)
+    users = [other for other in groups if key not in other.unused]
+    alike = [other for other in users if other.settings.get(key) == value]
+    return 2 * len(alike) > len(users) and all(
+        other in alike for other in users if other.algorithm == group.algorithm)
 
 
 def setting_texts(group, keys):
