@@ -106,8 +106,14 @@ class Processes:
 def processes(tmp_path):
     made = Processes(tmp_path)
     yield made
-    for process in made.started:
-        if process.poll() is None:
+    for process in reversed(made.started):
+        if process.poll() is not None:
+            continue
+        # what is launched ends its nodes, which are in groups of their own
+        os.killpg(process.pid, signal.SIGINT)
+        try:
+            process.wait(30)
+        except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
 
