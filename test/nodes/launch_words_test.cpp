@@ -35,7 +35,7 @@ class Folder : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(path_); }
 
-  LaunchArguments arguments() const { return readLaunchFile(path_ / "top.launch"); }
+  LaunchArguments arguments() const { return readLaunchFile(path_ / "top.launch", path_); }
 
   std::filesystem::path path_;
 };

@@ -65,11 +65,13 @@ TEST_F(ToTheSpareBody, StepsGoOverOneConnectionThatStays) {
   std::uint64_t episode = 0;
   for (bool over = true; micros.size() < 2000;) {
     if (over) {
-      link.reset(++episode, episode);
+      ++episode;
+      link.reset(episode, episode);
       step = 0;
     }
     const auto start = std::chrono::steady_clock::now();
-    const pmeta::RemoteAnswer answer = link.step(episode, ++step, {static_cast<double>(step % 2)});
+    ++step;
+    const pmeta::RemoteAnswer answer = link.step(episode, step, {static_cast<double>(step % 2)});
     const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - start;
     micros.push_back(took.count());
     over = answer.terminated || answer.truncated;
