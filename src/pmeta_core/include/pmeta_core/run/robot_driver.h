@@ -30,8 +30,10 @@ struct DriverSettings {
 /// What joints measure at a time, as sensor_msgs/JointState has it: in any order, and each list but
 /// the names may be empty.
 struct JointReadings {
-  std::vector<std::string> names;
-  std::vector<double> positions, velocities, efforts;
+  std::vector<std::string> names;  ///< of the joints
+  std::vector<double> positions;   ///< rad or m
+  std::vector<double> velocities;  ///< rad/s or m/s
+  std::vector<double> efforts;     ///< N m or N
 };
 
 /// Decides period by period what a robot is commanded: a policy's greedy action while the driver is
