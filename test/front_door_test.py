@@ -32,7 +32,7 @@ BAD_SETTINGS = [
     ("environment.name:=gridwold",
      "unknown environment 'gridwold': did you mean 'gridworld'? Known are "
                                   "ant_fwd_back, cart_pole, gridworld, half_cheetah_dir, "
-                                  "half_cheetah_vel, mjcf, mountain_car, sparse_point_robot, "
+                                  "half_cheetah_vel, mjcf, mountain_car, remote, sparse_point_robot, "
                                   "walker_2d_params."),
     ("rounds:=2.5",
      "rounds is '2.5' (given as rounds:=2.5) but must be a whole number, from 1 to 1e+06."),

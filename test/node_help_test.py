@@ -10,8 +10,9 @@ from programs import TOP, environment, run
 # what every node has
 COMMON = {"/rosout", "get_loggers", "set_logger_level"}
 NODES = {"meta_aggregator": "/pmeta/meta_aggregator", "task_agent": "/pmeta/task_agent_0",
-         "run_guard": "/pmeta/run_guard", "trajectory_view": "/pmeta/trajectory_view",
-         "policy_node": "/pmeta/policy_node", "drive_robot": "/pmeta/drive_robot"}
+         "run_guard": "/pmeta/run_guard", "trajectory_view": "/pmeta/trajectory_view"}
+# these, which both offer begin_episode, one after the other
+ACTING = {"policy_node": "/pmeta/policy_node", "drive_robot": "/pmeta/drive_robot"}
 
 
 def told(text):
@@ -54,7 +55,7 @@ def wait_for(condition, seconds=60):
 def test_each_help_names_the_topics_and_services_that_there_are(tmp_path):
     env = environment(tmp_path)
     helps = {program: told(run([TOP / "devel/lib/pmeta_nodes" / program, "--help"], env=env).stdout)
-             for program in NODES}
+             for program in {**NODES, **ACTING}}
     helps["trajectory_view"]["publishes"].discard("playback")  # of scenes that move
     folder = tmp_path / "gridworld" / "r"
     launch = subprocess.Popen(
@@ -62,22 +63,29 @@ def test_each_help_names_the_topics_and_services_that_there_are(tmp_path):
          "gridworld.launch", "rounds:=1", "hold:=true", "view:=true", "view_prefix:=env",
          "results_dir:=%s" % tmp_path, "run_id:=r"],
         env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    policies = []
     try:
         master = xmlrpc.client.ServerProxy(env["ROS_MASTER_URI"])
         wait_for(lambda: (folder / "policies/task_0.safetensors").exists())
-        # a policy which finds out its task
-        policies = [subprocess.Popen(
-            ["rosrun", "pmeta_nodes", program, "__ns:=/pmeta", "_policy:=%s" % (
-                TOP / "config/policies/half_cheetah_dir/policies/meta.safetensors")],
-            env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            for program in ("policy_node", "drive_robot")]
         for program, node in NODES.items():
+            does_what_it_says(master, node, helps[program])
+        for program, node in ACTING.items():
+            # a policy that finds out its task
+            acting = subprocess.Popen(
+                ["rosrun", "pmeta_nodes", program, "__ns:=/pmeta", "_policy:=%s" % (
+                    TOP / "config/policies/half_cheetah_dir/policies/meta.safetensors")],
+                env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             try:
-                wait_for(lambda: done_by(master, node) == helps[program], 20)
-            except AssertionError:
-                assert done_by(master, node) == helps[program], program
+                does_what_it_says(master, node, helps[program])
+            finally:
+                acting.terminate()
+                acting.wait(60)
     finally:
-        for process in policies + [launch]:
-            process.terminate()
-            process.wait(60)
+        launch.terminate()
+        launch.wait(60)
+
+
+def does_what_it_says(master, node, told_of_it):
+    try:
+        wait_for(lambda: done_by(master, node) == told_of_it, 20)
+    except AssertionError:
+        assert done_by(master, node) == told_of_it, node

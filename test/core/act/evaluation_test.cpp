@@ -98,7 +98,10 @@ class Sparse : public Env {
  public:
   const EnvSpec& spec() const override { return spec_; }
   void reset(Rng&, double* observation) override { observation[0] = 0; }
-  Step step(const double*, Rng&, double*) override { return {-5, true, false, 3}; }
+  Step step(const double*, Rng&, double* observation) override {
+    observation[0] = 0;
+    return {-5, true, false, 3};
+  }
 
  private:
   EnvSpec spec_{"sparse", 1, 1, 0, 1};

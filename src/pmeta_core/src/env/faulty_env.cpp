@@ -3,6 +3,7 @@
 #include <new>
 
 #include "pmeta_core/base/format.h"
+#include "pmeta_core/base/process.h"
 #include "pmeta_core/env/env.h"
 
 namespace pmeta {
@@ -19,6 +20,8 @@ void rethrowFault(const std::string& failed, bool foreign) {
   } catch (const BrokenEpisode&) {
     throw;
   } catch (const FaultyEnv&) {
+    throw;
+  } catch (const Interrupted&) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;

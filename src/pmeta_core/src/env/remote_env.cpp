@@ -47,7 +47,7 @@ EnvSpec specOf(const RemoteDescription& description) {
   for (Quantity& one : action) {
     if (description.choices.empty()) one = {one.name, "", -1, 1};
   }
-  EnvSpec spec = describedSpec("remote", description.horizon, description.observation, action,
+  EnvSpec spec = describedSpec(kRemoteName, description.horizon, description.observation, action,
                                description.choices);
   spec.step_seconds = description.step_seconds;
   return spec;

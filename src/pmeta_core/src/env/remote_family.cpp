@@ -12,7 +12,7 @@
 namespace pmeta {
 namespace {
 
-const RegisteredFamily<RemoteFamily> kFamily("remote");
+const RegisteredFamily<RemoteFamily> kFamily(kRemoteName);
 
 const std::string kObservations = "environment.observations";
 const std::string kActions = "environment.actions";

@@ -12,6 +12,9 @@
 
 namespace pmeta {
 
+/// Name of the family.
+constexpr char kRemoteName[] = "remote";
+
 /// What a body in another process tells of itself, as DescribeEnv.srv has it.
 struct RemoteDescription {
   std::vector<Quantity> observation{};  ///< in its own units; infinite bounds where it has none
