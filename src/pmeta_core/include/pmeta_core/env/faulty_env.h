@@ -15,7 +15,8 @@ class FaultyEnv : public Error {
 
 /// To be called where something of an environment's or of its family's has been caught: throws it
 /// as FaultyEnv, "<failed>: <its words>.", unless others know better what it means: BrokenEpisode,
-/// Interrupted, want of memory, and what pMeta's own environments (`foreign` is false) throw as Error.
+/// Interrupted, want of memory, and what pMeta's own environments (`foreign` is false) throw as
+/// Error.
 [[noreturn]] void rethrowFault(const std::string& failed, bool foreign);
 
 }  // namespace pmeta
