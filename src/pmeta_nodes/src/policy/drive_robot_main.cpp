@@ -1,10 +1,8 @@
-#include <cstdint>
-
 #include "common/private_param.h"
 #include "common/run_node.h"
-#include "pmeta_core/base/error.h"
 #include "pmeta_core/base/process.h"
 #include "policy/drive_robot.h"
+#include "policy/policy_params.h"
 
 namespace {
 
@@ -40,20 +38,13 @@ While it is disarmed, an input is stale, missing or refused, or the policy knows
 action is commanded; /diagnostics says why.
 )";
 
-constexpr int kMostTasks = 1000000;  // whose policy it is decides how many there are
-constexpr int kMostSeeds = 2147483647;
 constexpr double kMostRate = 1e4;
 constexpr double kMost = 1e9;
 
 using namespace pmeta_nodes;
 
 int drive() {
-  const std::string path = privateText("policy", "");
-  if (path.empty()) {
-    throw pmeta::Error(
-        "which policy? Give the private parameter policy, e.g. "
-        "_policy:=RUN_FOLDER/policies/task_0.safetensors.");
-  }
+  const PolicyParams params = policyParams();
   const std::vector<std::string> single_inputs = privateNames("single_inputs");
   const std::vector<std::string> ignored_joints = privateNames("ignored_joints");
   pmeta::DriverSettings settings;
@@ -64,9 +55,8 @@ int drive() {
   settings.actuators = privateNames("actuators");
   settings.single_inputs = {single_inputs.begin(), single_inputs.end()};
   settings.ignored_joints = {ignored_joints.begin(), ignored_joints.end()};
-  pmeta::RobotDriver driver(path, privateIndex("task", -1, kMostTasks), settings);
-  const auto seed = static_cast<std::uint64_t>(privateIndex("seed", 0, kMostSeeds));
-  if (privateFlag("explore", true)) driver.explore(seed);
+  pmeta::RobotDriver driver(params.file, params.task, settings);
+  if (params.explores) driver.explore(params.seed);
   const DriveRobot node(driver, single_inputs);
   pmeta::heedStopSignals();  // the safe action is the last that is commanded
   spinUntilStopped();

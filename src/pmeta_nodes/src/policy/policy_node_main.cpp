@@ -1,9 +1,6 @@
-#include <cstdint>
-
-#include "common/private_param.h"
 #include "common/run_node.h"
-#include "pmeta_core/base/error.h"
 #include "policy/policy_node.h"
+#include "policy/policy_params.h"
 
 namespace {
 
@@ -27,20 +24,9 @@ publishes    action (std_msgs/Float64MultiArray): the greedy action, one number 
 An observation of a wrong size, or that is not finite, gets a warning and no action.
 )";
 
-constexpr int kMostTasks = 1000000;  // whose policy it is decides how many there are
-constexpr int kMostSeeds = 2147483647;
-
 int act() {
-  const std::string path = pmeta_nodes::privateText("policy", "");
-  if (path.empty()) {
-    throw pmeta::Error(
-        "which policy? Give the private parameter policy, e.g. "
-        "_policy:=RUN_FOLDER/policies/task_0.safetensors.");
-  }
-  const pmeta_nodes::PolicyNode node(
-      path, pmeta_nodes::privateIndex("task", -1, kMostTasks),
-      pmeta_nodes::privateFlag("explore", true),
-      static_cast<std::uint64_t>(pmeta_nodes::privateIndex("seed", 0, kMostSeeds)));
+  const pmeta_nodes::PolicyParams params = pmeta_nodes::policyParams();
+  const pmeta_nodes::PolicyNode node(params.file, params.task, params.explores, params.seed);
   pmeta_nodes::spinUntilStopped();
   return 0;
 }
