@@ -15,11 +15,15 @@ wait_until() {
 
 rviz_listens() { rostopic info /pmeta/markers 2> /dev/null | grep -q rviz; }
 
-# Sets DISPLAY, ROS_MASTER_URI and what rviz needs there; SCREEN_DIR is a folder for what is short-lived.
-start_screen() {
-  local port
+# SCREEN_DIR is a folder for what is short-lived: while it is empty it goes whatever happens.
+prepare_screen() {
   SCREEN_DIR=$(mktemp -d)
   trap end_screen EXIT
+}
+
+# Sets DISPLAY, ROS_MASTER_URI and what rviz needs there.
+start_screen() {
+  local port
   Xvfb -displayfd 3 -screen 0 "$SCREEN_SIZE"x24 +extension GLX -nolisten tcp \
     3> "$SCREEN_DIR/display" 2> "$SCREEN_DIR/xvfb.log" &
   SCREEN=$!

@@ -35,6 +35,7 @@ command_main() {
   setup "${PACKAGES_SCREENSHOT[@]}" "${PACKAGES_FILM[@]}"
   ensure_built
 
+  prepare_screen
   start_screen
   echo "showing $name with rviz on a screen in memory"
   launch_on_screen --skip-log-check pmeta_nodes show.launch "run:=$folder" "${assignments[@]}"

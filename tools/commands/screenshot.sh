@@ -32,7 +32,7 @@ command_main() {
   setup "${PACKAGES_SCREENSHOT[@]}"
 
   # a short run of its own, where nothing else is asked for
-  start_screen
+  prepare_screen
   local given=" ${assignments[*]} "
   [[ $given == *" results_dir:="* ]] || assignments+=("results_dir:=$SCREEN_DIR/results")
   [[ $given == *" rounds:="* ]] || assignments+=(rounds:=3)
@@ -40,6 +40,7 @@ command_main() {
   # at idle priority rviz might never come up on a machine that is busy
   prepare_launch "$experiment" "${assignments[@]}" rviz:=true view_prefix:=env
 
+  start_screen
   echo "running $experiment with rviz on a screen in memory"
   launch_on_screen "${LAUNCH[@]}"
   wait_until 3600 "the last round" run_ended
