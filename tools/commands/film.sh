@@ -1,6 +1,6 @@
 # Results: a film of trained policies, as rviz shows them
 #
-# usage: ./pmeta film EXPERIMENT|RUN [-o FILE] [--seconds N] [speed:=N] [rviz_config:=FILE]
+# usage: ./pmeta film EXPERIMENT|RUN [-o FILE] [--seconds N] [best:=true] [speed:=N] [rviz_config:=FILE]
 #
 # EXPERIMENT and RUN are those of ./pmeta show. The film, of 12 seconds unless told otherwise, goes to
 # FILE (EXPERIMENT.mp4); its ending says the format: .mp4, .webm, .gif.
@@ -41,8 +41,12 @@ command_main() {
   launch_on_screen --skip-log-check pmeta_nodes show.launch "run:=$folder" "${assignments[@]}"
   wait_until 300 "rviz" rviz_listens
   sleep 8  # rviz has drawn, and all episodes are on their way
+  # never half a film under its name
+  local made=$SCREEN_DIR/film.${file##*.}
+  # how long is said of the input: a GIF's palette waits for its end
   ffmpeg -nostdin -loglevel error -y -f x11grab -framerate "$FRAME_RATE" -video_size "$SCREEN_SIZE" \
-    -i "$DISPLAY" -t "$seconds" -vf "$(filter_of "$file")" "$file" || die "the film could not be made."
+    -t "$seconds" -i "$DISPLAY" -vf "$(filter_of "$file")" "$made" || die "the film could not be made."
+  mv "$made" "$file"
   leave_screen
   echo "film: $file"
 }

@@ -1,10 +1,10 @@
 # Learn: rviz with trained policies, without training
 #
-# usage: ./pmeta show EXPERIMENT|RUN [speed:=N] [rviz_config:=FILE]
+# usage: ./pmeta show EXPERIMENT|RUN [best:=true] [speed:=N] [rviz_config:=FILE]
 #
 # EXPERIMENT is a set whose trained policies are shipped (config/policies), RUN the folder of a run
 # that is over. Both policies of each task are evaluated, which takes seconds, and played until
-# Ctrl-C; speed:=2 plays them twice as fast.
+# Ctrl-C; speed:=2 plays them twice as fast, best:=true those that the run had when it was best.
 #
 # Examples:
 #   ./pmeta show half_cheetah_dir

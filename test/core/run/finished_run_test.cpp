@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -44,7 +45,7 @@ TEST(FinishedRun, PoliciesDoWhatTheyDidInTheLastRound) {
     const Experiment experiment = points(dir.path(), encoding);
     RunLog log(experiment);
     const LocalResult result = runLocally(experiment, &log);
-    const FinishedRun run(log.dir());
+    const FinishedRun run(log.dir(), Kept::kLast);
     EXPECT_EQ(run.round(), 3);
     EXPECT_EQ(run.experiment().settings().run_id, "run");
     for (const TaskReturn& row : lastReturns(result, PolicyKind::kPersonal, 0)) {
@@ -68,6 +69,45 @@ TEST(FinishedRun, PoliciesDoWhatTheyDidInTheLastRound) {
   }
 }
 
+// the first of the highest
+struct Best {
+  int round = 0;
+  double mean = -std::numeric_limits<double>::infinity();
+
+  void offer(int of, double value) {
+    if (value > mean) *this = {of, value};
+  }
+};
+
+TEST(FinishedRun, BestPoliciesDoWhatTheyDidInTheirRound) {
+  const TempDir dir;
+  const Experiment experiment = points(dir.path(), "one_hot");
+  RunLog log(experiment);
+  const LocalResult result = runLocally(experiment, &log);
+  std::vector<Best> personal(3);
+  Best meta;
+  for (const RoundBook::Round& round : result.rounds) {
+    meta.offer(round.summary.round, round.summary.meta_return);
+    for (const RoundRow& row : round.rows) {
+      if (row.result.policy != PolicyKind::kPersonal) continue;
+      personal.at(static_cast<std::size_t>(row.result.task))
+          .offer(row.result.round, row.result.mean);
+    }
+  }
+  const FinishedRun run(log.dir(), Kept::kBest);
+  for (int task = 0; task < 3; ++task) {
+    const ShownPolicy shown = run.personal(task).value();
+    EXPECT_EQ(shown.result.mean, personal[static_cast<std::size_t>(task)].mean);
+    EXPECT_EQ(shown.result.round, personal[static_cast<std::size_t>(task)].round);
+  }
+  double sum = 0;
+  for (const ShownPolicy& shown : run.meta()) {
+    EXPECT_EQ(shown.result.round, meta.round);
+    sum += shown.result.mean;
+  }
+  EXPECT_DOUBLE_EQ(sum / 3, meta.mean);
+}
+
 TEST(FinishedRun, MayLackPoliciesButNotAll) {
   const TempDir dir;
   const Experiment experiment = points(dir.path(), "one_hot");
@@ -75,12 +115,12 @@ TEST(FinishedRun, MayLackPoliciesButNotAll) {
   runLocally(experiment, &log);
   std::filesystem::remove(log.dir() + "/policies/meta.safetensors");
   std::filesystem::remove(log.dir() + "/policies/task_0.safetensors");
-  const FinishedRun run(log.dir());
+  const FinishedRun run(log.dir(), Kept::kLast);
   EXPECT_FALSE(run.personal(0).has_value());
   EXPECT_TRUE(run.personal(1).has_value());
   EXPECT_TRUE(run.meta().empty());
   std::filesystem::remove_all(log.dir() + "/policies");
-  EXPECT_THAT(test::errorOf([&] { FinishedRun{log.dir()}; }),
+  EXPECT_THAT(test::errorOf([&] { FinishedRun(log.dir(), Kept::kLast); }),
               HasSubstr("has no policies below policies/: only a run that is over keeps them."));
 }
 

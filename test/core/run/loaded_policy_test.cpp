@@ -258,7 +258,7 @@ TEST(LoadedPolicy, RefusesParametersThatDoNotFitTheirSettings) {
   const std::string path = dir / "policy.safetensors";
   const Experiment grid = gridExperiment();
   const auto error = [&](const std::string& key, const std::string& value) {
-    auto metadata = policyMetadata(grid, PolicyKind::kPersonal, 2, 10);
+    auto metadata = policyMetadata(grid, {PolicyKind::kPersonal, 2, 10});
     metadata[key] = value;
     if (value.empty()) metadata.erase(key);
     savePolicy(path, grid.makeLearner(2)->personal(), metadata);

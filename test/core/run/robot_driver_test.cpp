@@ -30,7 +30,7 @@ class RobotDriverTest : public ::testing::Test {
         file_(dir_.path() + "/policy.safetensors") {
     Model model = experiment_.initialModel();
     for (float& x : model.floats()) x *= 3;  // large actions
-    savePolicy(file_, model, policyMetadata(experiment_, PolicyKind::kPersonal, 0, 7, {}));
+    savePolicy(file_, model, policyMetadata(experiment_, {PolicyKind::kPersonal, 0, 7}));
     settings_.single_inputs = {"turn_control", "shoulder_control", "elbow_control",
                                "reach_x",      "reach_y",          "reach_z",
                                "to_reach_x",   "to_reach_y",       "to_reach_z"};

@@ -275,7 +275,7 @@ TEST_F(PolicyFileTest, ARunLeavesItsPoliciesInItsFolder) {
 }
 
 TEST_F(PolicyFileTest, SaysWhatItsNumbersAreAndHowLongAStepTakes) {
-  const auto grid = policyMetadata(gridExperiment({"sizes:=[4, 5]"}), PolicyKind::kPersonal, 1, 3);
+  const auto grid = policyMetadata(gridExperiment({"sizes:=[4, 5]"}), {PolicyKind::kPersonal, 1, 3});
   const Json rows = {{"name", "row"}, {"unit", "cells"}, {"low", 0}, {"high", 4}};
   EXPECT_EQ(Json::parse(grid.at("observation")).at(0), rows);
   EXPECT_EQ(Json::parse(grid.at("action")).at(0).at("high"), 3);
@@ -284,7 +284,7 @@ TEST_F(PolicyFileTest, SaysWhatItsNumbersAreAndHowLongAStepTakes) {
 
   const Experiment cheetahs = Experiment::parse(
       "environment: {name: half_cheetah_dir}\nlearner: sac\nsac: {task_encoding: one_hot}", "test");
-  const auto robot = policyMetadata(cheetahs, PolicyKind::kMeta, 0, 3);
+  const auto robot = policyMetadata(cheetahs, {PolicyKind::kMeta, -1, 3});
   const Json observation = Json::parse(robot.at("observation"));
   ASSERT_EQ(observation.size(), 20u);
   const Json height = {{"name", "root_z"}, {"unit", "m"}, {"low", nullptr}, {"high", nullptr}};

@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "pmeta_core/base/error.h"
+#include "pmeta_core/run/meta_keeper.h"
 #include "pmeta_core/run/meta_trainer.h"
 #include "pmeta_core/run/round_driver.h"
 #include "pmeta_core/storage/checkpoint.h"
-#include "pmeta_core/storage/policy_file.h"
 
 namespace pmeta {
 namespace {
@@ -27,7 +27,8 @@ class LocalRun : private RoundOutlet {
         log_(log),
         keeps_(experiment.settings().fresh_episodes > 0),
         // nobody is late in one process
-        driver_(experiment, RoundTimes(), *this, Clock::now()) {
+        driver_(experiment, RoundTimes(), *this, Clock::now()),
+        keeper_(experiment) {
     if (experiment.hasMetaLearner()) {
       meta_trainer_ = std::make_unique<MetaTrainer>(experiment);
       parties_.push_back(meta_trainer_.get());
@@ -83,7 +84,7 @@ class LocalRun : private RoundOutlet {
 
   void savePolicies() const {
     const int round = driver_.round();
-    saveRunPolicy(experiment_, PolicyKind::kMeta, -1, round, meta().model);
+    keeper_.saveLast(meta());
     for (const Party* party : parties_) party->savePersonal(experiment_, round);
   }
 
@@ -110,7 +111,10 @@ class LocalRun : private RoundOutlet {
     for (Party* party : parties_) {
       if (!party->trains()) continue;
       auto trained = party->trainRound(meta());
-      if (trained->personal) driver_.add(*trained->personal);
+      if (trained->personal) {
+        if (log_ != nullptr) party->keepBest(experiment_);
+        driver_.add(*trained->personal);
+      }
       const MetaAggregator::Answer answer =
           driver_.offer(std::make_shared<AuxiliaryUpdate>(std::move(trained->update)));
       if (answer.verdict != MetaAggregator::Verdict::kAccepted) throw Error(answer.reason);
@@ -134,7 +138,10 @@ class LocalRun : private RoundOutlet {
 
   void write(const RoundBook::Round& round) override {
     if (keeps_ && !round.rows.empty()) fresh_.offer(round, agents_, meta());
-    if (log_ != nullptr) log_->write(round);
+    if (log_ != nullptr) {
+      keeper_.offer(round, meta());
+      log_->write(round);
+    }
     written_ = round;
   }
 
@@ -142,6 +149,7 @@ class LocalRun : private RoundOutlet {
   RunLog* log_;
   bool keeps_;  // policies, for fresh episodes
   RoundDriver driver_;
+  MetaKeeper keeper_;
   std::deque<TaskAgent> agents_;               // those that train first
   std::unique_ptr<MetaTrainer> meta_trainer_;  // in their place
   std::vector<Party*> parties_;                // the ones or the other

@@ -9,6 +9,7 @@
 namespace pmeta {
 
 void Party::savePersonal(const Experiment&, int) const {}
+void Party::keepBest(const Experiment&) {}
 
 ReturnStats overFreshEpisodes(std::uint64_t seed, int task, int episodes,
                               const std::function<ReturnStats(Rng& rng)>& evaluate) {

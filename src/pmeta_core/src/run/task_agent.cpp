@@ -210,7 +210,19 @@ void TaskAgent::loadState(StateReader& reader) {
 
 void TaskAgent::savePersonal(const Experiment& experiment, int round) const {
   if (!trains()) return;
-  saveRunPolicy(experiment, PolicyKind::kPersonal, task_, round, personal(), taskInput());
+  saveRunPolicy(experiment, Kept::kLast, personalOrigin(round), personal());
+}
+
+void TaskAgent::keepBest(const Experiment& experiment) {
+  const PolicyOrigin origin = personalOrigin(round_);
+  if (origin.mean_return) best_.offer(experiment, origin, personal());
+}
+
+PolicyOrigin TaskAgent::personalOrigin(int round) const {
+  PolicyOrigin origin{PolicyKind::kPersonal, task_, round, std::nullopt, taskInput()};
+  const std::optional<TaskReturn>& result = last_.personal;
+  if (round == round_ && result && result->scheduled) origin.mean_return = result->mean;
+  return origin;
 }
 
 std::optional<Episode> TaskAgent::recordPersonal() const {

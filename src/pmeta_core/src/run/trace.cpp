@@ -39,7 +39,7 @@ class Table {
 }  // namespace
 
 void writeTrajectories(const std::string& run_dir) {
-  const FinishedRun run(run_dir);
+  const FinishedRun run(run_dir, Kept::kLast);
   const Experiment& experiment = run.experiment();
   const RunLock lock(run_dir);
   Table table;
@@ -55,7 +55,8 @@ void writeTrajectories(const std::string& run_dir) {
     for (const ShownPolicy& meta : run.meta()) add(meta);
   }
   for (std::size_t i = 1; i < counts.size(); ++i) {
-    const FinishedRun after(run_dir, {"exploration_episodes:=[" + std::to_string(counts[i]) + "]"});
+    const FinishedRun after(run_dir, Kept::kLast,
+                            {"exploration_episodes:=[" + std::to_string(counts[i]) + "]"});
     for (const ShownPolicy& meta : after.meta()) add(meta);
   }
   writeFileAtomically(run_dir + "/trajectories.csv", table.text());

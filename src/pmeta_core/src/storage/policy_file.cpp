@@ -292,18 +292,17 @@ PolicyFile loadPolicy(const std::string& path) {
   return policy;
 }
 
-std::map<std::string, std::string> policyMetadata(const Experiment& experiment, PolicyKind policy,
-                                                  int task, int round,
-                                                  const std::vector<float>& task_input) {
+std::map<std::string, std::string> policyMetadata(const Experiment& experiment,
+                                                  const PolicyOrigin& origin) {
   const ExperimentSettings& settings = experiment.settings();
-  const auto env = experiment.family().make(policy == PolicyKind::kMeta ? 0 : task);
+  const auto env = experiment.family().make(origin.policy == PolicyKind::kMeta ? 0 : origin.task);
   const EnvSpec& spec = env->spec();
   const PolicyForm form = experiment.policies(*env)->form();
   std::map<std::string, std::string> metadata = {
       {"environment", settings.environment},
       {"learner", experiment.hasMetaLearner() ? settings.algorithm : settings.learner},
-      {"policy", name(policy)},
-      {"round", std::to_string(round)},
+      {"policy", name(origin.policy)},
+      {"round", std::to_string(origin.round)},
       {"run_id", settings.run_id},
       {"observation_size", std::to_string(spec.observation_size)},
       {"num_actions", std::to_string(spec.num_actions)},
@@ -322,22 +321,31 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment, 
     metadata["model_hash"] = model->hash;
     if (!model->file.empty()) metadata["model_file"] = model->file;
   }
-  if (policy == PolicyKind::kPersonal) metadata["task"] = std::to_string(task);
-  if (!task_input.empty()) {
+  if (origin.policy == PolicyKind::kPersonal) metadata["task"] = std::to_string(origin.task);
+  if (origin.mean_return) metadata["return"] = formatNumber(*origin.mean_return);
+  if (!origin.task_input.empty()) {
     std::vector<std::string> numbers;
-    for (const float value : task_input) numbers.push_back(formatNumber(value));
+    for (const float value : origin.task_input) numbers.push_back(formatNumber(value));
     metadata["task_input"] = join(numbers, ",");
   }
   return metadata;
 }
 
-void saveRunPolicy(const Experiment& experiment, PolicyKind policy, int task, int round,
-                   const Model& model, const std::vector<float>& task_input) {
-  const std::string dir = experiment.runDir() + "/policies";
-  requireWritable(dir);
-  const std::string file = policy == PolicyKind::kMeta ? "meta" : "task_" + std::to_string(task);
-  savePolicy(dir + "/" + file + ".safetensors", model,
-             policyMetadata(experiment, policy, task, round, task_input));
+std::string policiesFolder(Kept kept) {
+  return kept == Kept::kLast ? "policies" : "policies/best";
+}
+
+std::string policyPath(const std::string& run_dir, Kept kept, PolicyKind policy, int task) {
+  const std::string whose =
+      policy == PolicyKind::kMeta ? "meta" : "task_" + std::to_string(task);
+  return run_dir + "/" + policiesFolder(kept) + "/" + whose + ".safetensors";
+}
+
+void saveRunPolicy(const Experiment& experiment, Kept kept, const PolicyOrigin& origin,
+                   const Model& model) {
+  requireWritable(experiment.runDir() + "/" + policiesFolder(kept));
+  savePolicy(policyPath(experiment.runDir(), kept, origin.policy, origin.task), model,
+             policyMetadata(experiment, origin));
 }
 
 }  // namespace pmeta

@@ -251,7 +251,7 @@ void PartyNode::trainFrom(const pmeta::MetaPolicy& meta) {
   }
   if (experiment_.checkpointsAfter(round) || meta.checkpoint) saveCheckpoint(round);
   // before the aggregator can end the run, and with it this process
-  if (round == rounds) savePersonal();
+  savePersonal(round);
   if (result->personal) deliver(*result->personal);
   deliver(std::move(result->update));
   if (!trajectory_pubs_.empty() && result->personal) {
@@ -304,9 +304,10 @@ void PartyNode::saveCheckpoint(int round) {
   checkpoint_trouble_ = trouble;
 }
 
-void PartyNode::savePersonal() const {
+void PartyNode::savePersonal(int round) {
   try {
-    party_->savePersonal(experiment_, experiment_.settings().rounds);
+    party_->keepBest(experiment_);
+    if (round == experiment_.settings().rounds) party_->savePersonal(experiment_, round);
   } catch (const pmeta::Error& error) {
     // the others can do without this machine's file
     ROS_ERROR("the personal policy is not kept: %s", error.what());

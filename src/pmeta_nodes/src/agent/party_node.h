@@ -71,7 +71,7 @@ class PartyNode {
   void trainFrom(const pmeta::MetaPolicy& meta);
   void returnTo(const pmeta::MetaPolicy& meta);
   void saveCheckpoint(int round);
-  void savePersonal() const;
+  void savePersonal(int round);
   void waitForAggregator();
   void deliver(const pmeta::TaskReturn& result);
   void deliver(pmeta::AuxiliaryUpdate update);

@@ -64,6 +64,7 @@ MetaAggregatorNode::MetaAggregatorNode(const pmeta::Experiment& experiment, bool
       authenticator_(experiment.settings().key_file),
       driver_(std::in_place, experiment, timesOf(experiment), *this, Clock::now()),
       checkpoints_(experiment, pmeta::kAggregator, driver_->aggregator().metaPolicy().model.layout),
+      keeper_(experiment),
       log_(openLog(resume)),
       console_(experiment, isTerminal()),
       summary_(summaryBefore(experiment)),
@@ -195,9 +196,7 @@ void MetaAggregatorNode::endRounds() {
   const bool finished = driver_->end(Clock::now());
   const std::string dir = experiment_.runDir();
   const pmeta::MetaPolicy& meta = driver_->aggregator().metaPolicy();
-  if (meta.round > 0) {
-    pmeta::saveRunPolicy(experiment_, pmeta::PolicyKind::kMeta, -1, meta.round, meta.model);
-  }
+  if (meta.round > 0) keeper_.saveLast(meta);
   log_->finish(finished ? "finished" : "stopped");
   if (finished) {
     logLines(console_.table() + "finished; " + pmeta::listRunFolder(dir));
@@ -285,6 +284,11 @@ void MetaAggregatorNode::publish(const pmeta::MetaPolicy& meta) {
 // it is latched: only forged ones may have pushed it out of somebody's queue
 void MetaAggregatorNode::repeatMetaPolicy() {
   if (authenticator_.hasKey()) meta_pub_.publish(meta_msg_);
+}
+
+void MetaAggregatorNode::write(const pmeta::RoundBook::Round& round) {
+  keeper_.offer(round, driver_->aggregator().metaPolicy());
+  log_->write(round);
 }
 
 void MetaAggregatorNode::saveCheckpoint(int round) {

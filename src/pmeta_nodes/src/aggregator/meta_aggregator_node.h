@@ -21,6 +21,7 @@
 #include "common/refusals.h"
 #include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/run/console.h"
+#include "pmeta_core/run/meta_keeper.h"
 #include "pmeta_core/run/round_driver.h"
 #include "pmeta_core/security/authentication.h"
 #include "pmeta_core/storage/checkpoint.h"
@@ -71,7 +72,7 @@ class MetaAggregatorNode : public pmeta::RoundOutlet {
 
   void publish(const pmeta::MetaPolicy& meta) override;
   void repeatMetaPolicy() override;
-  void write(const pmeta::RoundBook::Round& round) override { log_->write(round); }
+  void write(const pmeta::RoundBook::Round& round) override;
   void saveCheckpoint(int round) override;
   void showRound(const pmeta::RoundBook::Round& round) override;
   void tell(const pmeta::RunStanding& standing) override;
@@ -87,6 +88,7 @@ class MetaAggregatorNode : public pmeta::RoundOutlet {
   const std::uint64_t incarnation_ = ros::WallTime::now().toNSec();
   std::optional<pmeta::RoundDriver> driver_;  ///< never empty; the worker's, and down to refusals_
   pmeta::CheckpointFolder checkpoints_;
+  pmeta::MetaKeeper keeper_;
   std::unique_ptr<pmeta::RunLog> log_;  ///< none: the run was finished before
   pmeta::RunConsole console_;
   pmeta_msgs::RoundSummary summary_;           ///< of the last complete round

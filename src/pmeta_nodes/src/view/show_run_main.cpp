@@ -14,6 +14,7 @@ constexpr char kHelp[] =
 
 private parameters
   ~run          folder with config.yaml and policies/ (required)
+  ~best         the best policies that the run had, not the last (false)
   ~config_file  the folder's config.yaml
 publishes    task_<i>/trajectory, returns, round, as agents and aggregator do; whoever comes late
              gets all of it
@@ -27,7 +28,8 @@ bool goOn() {
 int show(const pmeta::Experiment&) {
   const std::string folder = pmeta_nodes::privateText("run", "");
   if (folder.empty()) throw pmeta::Error("which run? Give the private parameter run, a folder.");
-  const pmeta::FinishedRun run(folder);
+  const bool best = pmeta_nodes::privateFlag("best", false);
+  const pmeta::FinishedRun run(folder, best ? pmeta::Kept::kBest : pmeta::Kept::kLast);
   pmeta_nodes::ShowRun node(ros::NodeHandle(), run);
   node.evaluate(goOn);
   ROS_INFO("showing the policies of %s, round %d; Ctrl-C ends it",

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "pmeta_core/experiment/experiment.h"
 #include "pmeta_core/messages/protocol.h"
 #include "pmeta_core/run/loaded_policy.h"
+#include "pmeta_core/storage/policy_file.h"
 
 namespace pmeta {
 
@@ -23,10 +25,11 @@ class FinishedRun {
  public:
   /// `run_dir` holds config.yaml and policies/; `overrides` of its settings as Experiment::load()
   /// takes them. Throws Error if it is no such folder, or has no policies.
-  explicit FinishedRun(std::string run_dir, const std::vector<std::string>& overrides = {});
+  FinishedRun(std::string run_dir, Kept kept, const std::vector<std::string>& overrides = {});
 
   const Experiment& experiment() const { return experiment_; }  ///< by the run's settings
-  int round() const { return round_; }                          ///< of training behind its policies
+  /// Of training behind its policies; the latest, where that differs.
+  int round() const { return round_; }
 
   /// A training task's personal policy, with what its file knows of the task; nothing where there
   /// is none.
@@ -37,9 +40,10 @@ class FinishedRun {
   std::vector<ShownPolicy> meta() const;
 
  private:
-  std::string policyPath(const std::string& name) const;
+  std::unique_ptr<LoadedPolicy> load(PolicyKind policy, int task) const;
 
   std::string run_dir_;
+  Kept kept_;
   Experiment experiment_;
   int round_ = 0;
 };

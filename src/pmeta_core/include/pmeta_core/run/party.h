@@ -80,6 +80,10 @@ class Party {
   /// Throws Error, e.g. if the disk is full.
   virtual void savePersonal(const Experiment& experiment, int round) const;
 
+  /// Keeps its personal policy as BestPolicy does, if the round trained last has evaluated it by
+  /// the schedule, and where it has one. Throws Error, e.g. if the disk is full.
+  virtual void keepBest(const Experiment& experiment);
+
   /// Episodes that broke down so far, in training and in the evaluations of rounds.
   virtual std::int64_t brokenEpisodes() const = 0;
 

@@ -9,6 +9,7 @@
 #include "pmeta_core/messages/protocol.h"
 #include "pmeta_core/run/divergence.h"
 #include "pmeta_core/run/party.h"
+#include "pmeta_core/storage/best_policy.h"
 
 namespace pmeta {
 
@@ -50,11 +51,13 @@ class TaskAgent : public Party {
   void loadState(StateReader& reader) override;
   std::optional<Episode> recordPersonal() const override;
   void savePersonal(const Experiment& experiment, int round) const override;
+  void keepBest(const Experiment& experiment) override;
 
  private:
   bool train(int round, const KeepGoing& keep_going, RoundResult& result);
   RoundResult lastResult() const;
   const Model& sent() const;
+  PolicyOrigin personalOrigin(int round) const;
   void adjustWeight(double personal_return);
   Rng evaluationRng() const;
   TaskReturn makeReturn(int round, PolicyKind policy, const ReturnStats& stats);
@@ -87,6 +90,7 @@ class TaskAgent : public Party {
   AdaptedReturn adapted_;              // of the newest evaluation of a meta-policy,
   int adapted_round_ = -1;             // which was this round's
   std::unique_ptr<PersonalLearner> learner_;
+  BestPolicy best_;  // of its personal ones
 };
 
 }  // namespace pmeta

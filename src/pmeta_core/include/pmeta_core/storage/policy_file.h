@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,8 +33,20 @@ void savePolicy(const std::string& path, const Model& model,
 /// anything else; what a file claims is held against its size before memory is taken.
 PolicyFile loadPolicy(const std::string& path);
 
+/// Where in a run a policy comes from.
+struct PolicyOrigin {
+  PolicyKind policy = PolicyKind::kMeta;  ///< whose
+  int task = -1;                          ///< of a personal policy
+  int round = 0;                          ///< after which
+  /// In the evaluation that this round's schedule had: a personal policy's on its own task, of a
+  /// meta-policy MP. None if there was no such evaluation.
+  std::optional<double> mean_return = std::nullopt;
+  std::vector<float> task_input = {};  ///< what tells it its task beside the observations
+};
+
 /// What a loader needs to rebuild and use a policy: "environment", "learner", "policy" (personal or
-/// meta), "task" (of a personal policy), "round", "run_id", "observation_size", "num_actions",
+/// meta), "task" (of a personal policy), "round", "return" (PolicyOrigin::mean_return, where there
+/// is one), "run_id", "observation_size", "num_actions",
 /// "observation" and "action" (JSON: `[{"name": "angle", "unit": "rad", "low": -0.2, "high": 0.2},
 /// ...]`, see Quantity; null is no bound), "choices" (JSON: names of the discrete actions),
 /// "step_seconds" (how long a step takes, where there is such a time), "hidden_activation",
@@ -41,13 +54,20 @@ PolicyFile loadPolicy(const std::string& path);
 /// "task_input" (numbers with commas between, if there are any), "model_hash" and "model_file" (of
 /// a physical model, and where it was; none if it is shipped) and "settings", the effective
 /// settings as YAML, whose model_file is the run folder's copy.
-std::map<std::string, std::string> policyMetadata(const Experiment& experiment, PolicyKind policy,
-                                                  int task, int round,
-                                                  const std::vector<float>& task_input = {});
+std::map<std::string, std::string> policyMetadata(const Experiment& experiment,
+                                                  const PolicyOrigin& origin);
 
-/// Writes a policy into the run's folder, as policies/meta.safetensors or
-/// policies/task_I.safetensors (`task` does not matter to a meta-policy). Throws Error.
-void saveRunPolicy(const Experiment& experiment, PolicyKind policy, int task, int round,
-                   const Model& model, const std::vector<float>& task_input = {});
+/// Which of a run's policies are meant: those it ended with, or the best it had.
+enum class Kept { kLast, kBest };
+
+/// "policies" or "policies/best", below the run's folder.
+std::string policiesFolder(Kept kept);
+
+/// Where a run keeps them: meta.safetensors or task_I.safetensors in policiesFolder().
+std::string policyPath(const std::string& run_dir, Kept kept, PolicyKind policy, int task);
+
+/// Writes a policy to its policyPath(). Throws Error.
+void saveRunPolicy(const Experiment& experiment, Kept kept, const PolicyOrigin& origin,
+                   const Model& model);
 
 }  // namespace pmeta
