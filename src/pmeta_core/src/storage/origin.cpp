@@ -1,0 +1,96 @@
+#include "pmeta_core/storage/origin.h"
+
+#include <nlohmann/json.hpp>
+
+#include "pmeta_core/base/build.h"
+#include "pmeta_core/base/error.h"
+#include "pmeta_core/base/format.h"
+#include "pmeta_core/base/version.h"
+#include "pmeta_core/nn/machine.h"
+#include "pmeta_core/storage/run_lock.h"
+
+namespace pmeta {
+namespace {
+
+using Texts = std::map<std::string, std::string>;
+
+struct Origin {
+  std::string host, version, commit;
+  Texts machine, settings;
+};
+
+Origin readOrigin(const std::string& origin) {
+  try {
+    const nlohmann::json json = nlohmann::json::parse(origin);
+    return {json.at("host").get<std::string>(), json.at("version").get<std::string>(),
+            json.at("commit").get<std::string>(), json.at("machine").get<Texts>(),
+            json.at("defining_settings").get<Texts>()};
+  } catch (const nlohmann::json::exception&) {
+    throw Error("the run does not say with what it was launched: launch it with the same version.");
+  }
+}
+
+std::string valueOf(const Texts& settings, const std::string& key) {
+  const auto found = settings.find(key);
+  return found == settings.end() ? "nothing" : shown(found->second);
+}
+
+}  // namespace
+
+std::string originOf(const Experiment& experiment) {
+  return nlohmann::json{{"host", hostName()},
+                        {"version", kVersion},
+                        {"commit", commit()},
+                        {"machine", machine()},
+                        {"defining_settings", experiment.definingSettings()}}
+      .dump();
+}
+
+OriginDifference differenceFrom(const std::string& origin, const Experiment& here) {
+  const Origin there = readOrigin(origin);
+  const std::string launched = ", but the run was launched on " + shown(there.host) + " with ";
+  const std::string host = shown(hostName());
+  OriginDifference difference;
+  if (there.version != kVersion) {
+    difference.refusal = host + " has pMeta " + kVersion + launched + plain(there.version, 60) +
+                         ": install the same version on both.";
+    return difference;
+  }
+  const Texts settings = here.definingSettings();
+  const std::string key = firstDifference(there.settings, settings);
+  if (!key.empty()) {
+    difference.refusal = host + " makes " + key + " " + valueOf(settings, key) + launched +
+                         valueOf(there.settings, key) +
+                         ": give both the same settings, and the same files that they name.";
+    return difference;
+  }
+  if (there.commit != commit()) {
+    difference.warnings.push_back(host + " has commit " + commit() + launched +
+                                  plain(there.commit, 60) + ": the result may be another.");
+  }
+  const std::string part = differingPart(here, there.machine);
+  if (!part.empty()) {
+    difference.warnings.push_back(
+        host + " is another kind of machine than " + shown(there.host) + ", which has " + part +
+        ": the result may differ from that of one machine" +
+        (here.settings().arithmetic == "native" ? "; arithmetic: portable makes it the same."
+                                                : "."));
+  }
+  return difference;
+}
+
+std::string differingPart(const Experiment& experiment, const Texts& other) {
+  // tables have no matrix products; portable ones are the same everywhere
+  if (!experiment.hasNetworks()) return "";
+  const bool portable = experiment.settings().arithmetic == "portable";
+  const Texts now = machine();
+  for (const std::string part : {"products", "processor", "glibc"}) {
+    if (portable && part != "glibc") continue;
+    const auto found = other.find(part);
+    if (found == other.end() || found->second == now.at(part)) continue;
+    return part + " " + shown(found->second) + ", here " + shown(now.at(part));
+  }
+  return "";
+}
+
+}  // namespace pmeta
