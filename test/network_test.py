@@ -253,8 +253,8 @@ def test_a_machine_with_another_version_or_settings_is_refused_by_name(tmp_path)
     same = compared()
     assert same.returncode == 0 and same.stderr == ""
     assert compared(commit="abc").stderr.startswith("pmeta: warning: ")
-    other = compared(version="9.9.9", host="desk")
+    other = compared(versions=dict(origin["versions"], pmeta="9.9.9"), host="desk")
     assert other.returncode == 1
-    assert "but the run was launched on 'desk' with 9.9.9: install the same version" in other.stderr
+    assert "but the run was launched on 'desk' with '9.9.9': install the same version" in other.stderr
     defining = dict(origin["defining_settings"], **{"personal.lambda": "77"})
     assert "makes personal.lambda " in compared(defining_settings=defining).stderr

@@ -113,7 +113,7 @@ def find_run(namespace):
 
 def answer_launcher(launcher):
     """Lets check_machines on the launching machine connect here, after connecting there."""
-    host, port = launcher.rsplit(":", 1)
+    host, port, word = launcher.rsplit(":", 2)
     require_own_address(host)
     try:
         link = connect(host, int(port))
@@ -122,7 +122,7 @@ def answer_launcher(launcher):
                          "to an address that this machine reaches, or see whether, on it, %s."
                          % (host, error.strerror or error, FIREWALL))
     with link, socket.create_server(("", 0)) as server:
-        link.sendall(("%s %d\n" % (own_host(), server.getsockname()[1])).encode())
+        link.sendall(("%s %s %d" % (word, own_host(), server.getsockname()[1])).encode())
         server.settimeout(2 * PATIENCE)
         try:
             server.accept()[0].close()
@@ -134,9 +134,10 @@ def answer_launcher(launcher):
 def check_agent(arguments):
     parser = Parser(prog="check_agent.py", description=__doc__)
     parser.add_argument("--namespace", default="pmeta", help="of the run (pmeta)")
-    parser.add_argument("--launcher", metavar="HOST:PORT",
-                        help="where check_machines waits, with the run's origin and settings on standard "
-                             "input; without it both are those of the run on the ROS master")
+    parser.add_argument("--launcher", metavar="HOST:PORT:WORD",
+                        help="where check_machines waits, and for which word, with the run's origin and "
+                             "settings on standard input; without it both are those of the run on the "
+                             "ROS master")
     parser.add_argument("places", nargs="*", metavar="key:=value",
                         help="results_dir and key_file here, where they are not those of the run")
     options = parser.parse_args(arguments)

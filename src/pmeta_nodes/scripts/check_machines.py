@@ -6,7 +6,9 @@ Logs in as roslaunch will, and has check_agent there look whether both machines 
 the same version and settings. Exits with 1 and a sentence for each machine that is not ready.
 """
 import concurrent.futures
+import contextlib
 import os
+import secrets
 import select
 import shlex
 import socket
@@ -21,10 +23,19 @@ from roslaunch import core, remoteprocess
 # catkin's relay runs this file from another folder
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from pmeta_program import Parser, run_program
-from pmeta_reach import FIREWALL, ReachError, connect, lines_of, own_host
+from pmeta_reach import FIREWALL, PATIENCE, ReachError, connect, lines_of, own_host
 
 LOGIN = 8  # seconds
 ANSWER = 30  # for what is asked there: a small computer takes a while to start a program
+
+
+def first_words(link):
+    with link:
+        link.settimeout(PATIENCE)
+        try:
+            return link.recv(512).decode(errors="replace").split()
+        except OSError:
+            return []
 
 
 class Machine:
@@ -61,13 +72,16 @@ class Machine:
         if self.is_local():
             return ""
         with socket.create_server(("", 0)) as server:
-            ssh, to_it, _, errors = self.login("%s rosrun pmeta_nodes check_agent.py --launcher %s:%d %s" % (
-                self.entry.env_loader, own_host(), server.getsockname()[1], " ".join(self.places)))
+            word = secrets.token_hex(8)
+            ssh, to_it, _, errors = self.login(
+                "%s rosrun pmeta_nodes check_agent.py --launcher %s:%d:%s %s"
+                % (self.entry.env_loader, own_host(), server.getsockname()[1], word, " ".join(self.places)))
             try:
                 channel = to_it.channel
-                to_it.write(asked)
-                channel.shutdown_write()
-                self.meet(server, channel)
+                with contextlib.suppress(OSError):  # it has ended: why is told below
+                    to_it.write(asked)
+                    channel.shutdown_write()
+                self.meet(server, word, channel)
                 limit = time.monotonic() + ANSWER
                 while not channel.exit_status_ready() and time.monotonic() < limit:
                     time.sleep(0.05)
@@ -80,15 +94,17 @@ class Machine:
             finally:
                 ssh.close()
 
-    def meet(self, server, channel):
-        """Waits for check_agent to connect here, and connects there; what it did not like it says itself."""
+    def meet(self, server, word, channel):
+        """Waits for check_agent to connect here with the word, and connects there; what it did not like it
+        says itself."""
         limit = time.monotonic() + ANSWER
         while not channel.exit_status_ready() and time.monotonic() < limit:
             if not select.select([server], [], [], 0.05)[0]:
                 continue
-            link = server.accept()[0]
-            with link, link.makefile() as lines:
-                host, port = lines.readline().split()
+            said = first_words(server.accept()[0])
+            if len(said) != 3 or said[0] != word:
+                continue  # a stranger
+            host, port = said[1:]
             try:
                 connect(host, int(port)).close()
             except OSError as error:

@@ -40,9 +40,10 @@ TEST(Origin, TheSameVersionAndSettingsOnTheSameMachineDifferInNothing) {
 TEST(Origin, AnotherVersionOrSettingIsRefusedByTheNamesOfBothMachines) {
   const Experiment e = gridExperiment({"run_id:=r", "lambda:=10"});
   const std::string here = "'" + hostName() + "' ";
-  EXPECT_EQ(differenceFrom(origin(e, "/version", "9.9"), e).refusal,
-            here + "has pMeta " + kVersion +
-                ", but the run was launched on 'desk' with 9.9: install the same version on both.");
+  EXPECT_EQ(
+      differenceFrom(origin(e, "/versions/pmeta", "9.9"), e).refusal,
+      here + "has pMeta '" + kVersion +
+          "', but the run was launched on 'desk' with '9.9': install the same version on both.");
   EXPECT_EQ(differenceFrom(origin(e, "/host", "desk"), gridExperiment({"run_id:=r", "lambda:=5"}))
                 .refusal,
             here +
@@ -50,6 +51,17 @@ TEST(Origin, AnotherVersionOrSettingIsRefusedByTheNamesOfBothMachines) {
                 "both the same settings, and the same files that they name.");
   EXPECT_EQ(errorOf([&] { differenceFrom("{}", e); }),
             "the run does not say with what it was launched: launch it with the same version.");
+}
+
+TEST(Origin, AnotherSimulatorIsAWarningWhereItSimulates) {
+  const Experiment cheetah =
+      Experiment::parse("{run_id: r, learner: sac, environment: {name: half_cheetah_dir}}", "text");
+  const std::vector<std::string> warnings =
+      differenceFrom(origin(cheetah, "/versions/mujoco", "1.50"), cheetah).warnings;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("launched on 'desk' with '1.50'"), std::string::npos);
+  const Experiment grid = gridExperiment({"run_id:=r"});
+  EXPECT_TRUE(differenceFrom(origin(grid, "/versions/mujoco", "1.50"), grid).warnings.empty());
 }
 
 TEST(Origin, AnotherCommitOrProcessorIsAWarning) {

@@ -114,4 +114,11 @@ void checkMachines(const std::vector<Machine>& machines, int tasks) {
   }
 }
 
+const Machine* machineOf(const std::vector<Machine>& machines, int task) {
+  const auto found = std::find_if(machines.begin(), machines.end(), [&](const Machine& machine) {
+    return std::find(machine.tasks.begin(), machine.tasks.end(), task) != machine.tasks.end();
+  });
+  return found == machines.end() ? nullptr : &*found;
+}
+
 }  // namespace pmeta

@@ -2,7 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pmeta_core/base/build.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/format.h"
 #include "pmeta_core/base/version.h"
@@ -15,35 +14,35 @@ namespace {
 using Texts = std::map<std::string, std::string>;
 
 struct Origin {
-  std::string host, version, commit;
-  Texts machine, settings;
+  std::string host, commit;
+  Texts machine, versions, settings;
 };
 
 Origin readOrigin(const std::string& origin) {
   try {
     const nlohmann::json json = nlohmann::json::parse(origin);
-    return {json.at("host").get<std::string>(), json.at("version").get<std::string>(),
-            json.at("commit").get<std::string>(), json.at("machine").get<Texts>(),
-            json.at("defining_settings").get<Texts>()};
+    return {json.at("host"), json.at("commit"), json.at("machine"), json.at("versions"),
+            json.at("defining_settings")};
   } catch (const nlohmann::json::exception&) {
     throw Error("the run does not say with what it was launched: launch it with the same version.");
   }
 }
 
-std::string valueOf(const Texts& settings, const std::string& key) {
-  const auto found = settings.find(key);
-  return found == settings.end() ? "nothing" : shown(found->second);
+std::string valueOf(const Texts& texts, const std::string& key) {
+  const auto found = texts.find(key);
+  return found == texts.end() ? "nothing" : shown(found->second);
 }
 
 }  // namespace
 
 std::string originOf(const Experiment& experiment) {
-  return nlohmann::json{{"host", hostName()},
-                        {"version", kVersion},
-                        {"commit", commit()},
-                        {"machine", machine()},
-                        {"defining_settings", experiment.definingSettings()}}
-      .dump();
+  nlohmann::json origin;
+  origin["host"] = hostName();
+  origin["commit"] = commit();
+  origin["machine"] = machine();
+  origin["versions"] = versions();
+  origin["defining_settings"] = experiment.definingSettings();
+  return origin.dump();
 }
 
 OriginDifference differenceFrom(const std::string& origin, const Experiment& here) {
@@ -51,8 +50,10 @@ OriginDifference differenceFrom(const std::string& origin, const Experiment& her
   const std::string launched = ", but the run was launched on " + shown(there.host) + " with ";
   const std::string host = shown(hostName());
   OriginDifference difference;
-  if (there.version != kVersion) {
-    difference.refusal = host + " has pMeta " + kVersion + launched + plain(there.version, 60) +
+  const Texts ours = versions();
+  const std::string version = valueOf(there.versions, "pmeta");
+  if (version != valueOf(ours, "pmeta")) {
+    difference.refusal = host + " has pMeta " + valueOf(ours, "pmeta") + launched + version +
                          ": install the same version on both.";
     return difference;
   }
@@ -67,6 +68,11 @@ OriginDifference differenceFrom(const std::string& origin, const Experiment& her
   if (there.commit != commit()) {
     difference.warnings.push_back(host + " has commit " + commit() + launched +
                                   plain(there.commit, 60) + ": the result may be another.");
+  }
+  const std::string mujoco = valueOf(there.versions, "mujoco");
+  if (here.model() != nullptr && mujoco != valueOf(ours, "mujoco")) {
+    difference.warnings.push_back(host + " has MuJoCo " + valueOf(ours, "mujoco") + launched +
+                                  mujoco + ": the result may be another.");
   }
   const std::string part = differingPart(here, there.machine);
   if (!part.empty()) {

@@ -1,6 +1,5 @@
 #include "launch/agents_launch.h"
 
-#include <algorithm>
 #include <regex>
 #include <sstream>
 
@@ -97,13 +96,8 @@ std::vector<PartyNode> partyNodes(const Experiment& experiment) {
   if (experiment.hasMetaLearner()) return {{"meta_learner", "meta_learner"}};
   std::vector<PartyNode> nodes;
   for (int task = 0; task < experiment.totalTasks(); ++task) {
-    nodes.push_back({"task_agent_" + std::to_string(task), "task_agent", task});
-    for (const Machine& machine : experiment.settings().machines) {
-      const std::vector<int>& tasks = machine.tasks;
-      if (std::find(tasks.begin(), tasks.end(), task) != tasks.end()) {
-        nodes.back().machine = &machine;
-      }
-    }
+    nodes.push_back({"task_agent_" + std::to_string(task), "task_agent", task,
+                     pmeta::machineOf(experiment.settings().machines, task)});
   }
   return nodes;
 }

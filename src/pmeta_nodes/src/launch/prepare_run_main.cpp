@@ -81,7 +81,7 @@ std::string takeAssignment(std::vector<std::string>& assignments, const std::str
       assignments.begin(), assignments.end(),
       [&](const std::string& assignment) { return assignment.rfind(key + ":=", 0) == 0; });
   if (found == assignments.end()) return "";
-  const std::string value = found->substr(key.size() + 2);
+  std::string value = found->substr(key.size() + 2);
   assignments.erase(found);
   return value;
 }

@@ -31,4 +31,7 @@ void bindMachines(Settings& settings, std::vector<Machine>& machines);
 /// that no other has.
 void checkMachines(const std::vector<Machine>& machines, int tasks);
 
+/// The one among them on which a task's agent runs; null if it runs where the run is launched.
+const Machine* machineOf(const std::vector<Machine>& machines, int task);
+
 }  // namespace pmeta
