@@ -53,12 +53,12 @@ def test_every_argument_says_what_it_is_and_is_used():
     assert set(re.findall(r"(\w+):=", lines)) <= set(arguments_of(root))
     assert set(arguments_of(root_of("rviz"))) <= {arg.get("name") for arg in root.findall("arg")
                                                   } | {"rviz_args"}
-    assert set(arguments_of(root_of("agent"))) <= set(arguments_of(root)) | {"task"}
+    assert set(arguments_of(root_of("agent"))) <= set(arguments_of(root)) | {"task", "check"}
 
 
 @pytest.mark.parametrize("experiment", sorted(chaos.EXPERIMENTS))
 def test_the_chaos_run_is_launched_with_the_settings_of_its_undisturbed_twin(tmp_path, experiment):
-    options = argparse.Namespace(seed=3, kills=10)
+    options = argparse.Namespace(seed=3, kills=10, rounds=0)
     words = chaos.Run(experiment, options, tmp_path).launch_arguments()
     # the key is made by the run itself
     words = [word for word in words if not word.startswith("key_file:=")]

@@ -88,8 +88,9 @@ def test_nobody_else_had_to_know_a_toy(name):
 
 # what a name also means where it is no row's
 ELSEWHERE = {
-    ("pmeta", "version.cpp"), ("pmeta", "scene.h"), ("pmeta", "runs.py"), ("pmeta", "chaos.py"),
-    ("pmeta", "pmeta_html.py"),  # the project
+    ("pmeta", "version.cpp"), ("pmeta", "origin.cpp"), ("pmeta", "scene.h"), ("pmeta", "runs.py"),
+    ("pmeta", "chaos.py"), ("pmeta", "pmeta_html.py"), ("pmeta", "check_agent.py"),
+    ("pmeta", "check_machines.py"),  # the project
     ("mean", "console.cpp"), ("mean", "pmeta_figures.py"), ("mean", "pmeta_sections.py"),
     ("mean", "pmeta_tables.py"),  # a column
     ("mean", "rl2_networks.cpp"), ("mean", "running_variance.cpp"),  # a block, a number

@@ -2,10 +2,10 @@
 
 PACKAGES_BUILD=(g++ make cmake git ca-certificates
   libdnnl-dev libeigen3-dev libhdf5-dev libsodium-dev libtinyxml2-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libbenchmark-dev libgtest-dev libgmock-dev)
-PACKAGES_PYTHON=(python3-matplotlib python3-numpy python3-yaml python3-pytest)
+PACKAGES_PYTHON=(python3-matplotlib python3-numpy python3-paramiko python3-yaml python3-pytest)
 PACKAGES_MUJOCO=(libmujoco-dev)
 PACKAGES_ONNX=(python3-onnx)
-PACKAGES_TEST=(chromium locales "${PACKAGES_ONNX[@]}" libopencv-dnn-dev)
+PACKAGES_TEST=(chromium iproute2 locales nftables "${PACKAGES_ONNX[@]}" libopencv-dnn-dev)
 PACKAGES_LINT_QUICK=(clang-format-14 shellcheck pyflakes3 doxygen)
 PACKAGES_LINT=(clang-tidy-14 catkin-lint)
 PACKAGES_COVERAGE=(gcovr)

@@ -11,6 +11,7 @@
 #   record:=true     record all topics beside the run folder
 #   ns:=NAME         nodes and topics below /NAME/pmeta, for several runs on one ROS master
 #   resume:=RUN_DIR  go on with a run that was stopped or killed
+#   agents:=false    agents run elsewhere. Settings may name machines for them: docs/ros.md
 #
 # Examples:
 #   ./pmeta run gridworld lambda:=5 seed:=1 rviz:=true

@@ -4,7 +4,8 @@
 #        ./pmeta settings mjcf
 #
 # EXPERIMENT is a file of config/ without .yaml, or the path of a settings file of your own. mjcf lists
-# the terms of which the environment of a robot of your own is made (docs/your_robot.md).
+# the terms of which the environment of a robot of your own is made (docs/your_robot.md). Those of machines are
+# shown for a file that names some (docs/ros.md).
 #
 # Examples:
 #   ./pmeta settings cart_pole

@@ -3,7 +3,8 @@
 says whether anything was lost: ./pmeta chaos.
 
 With --netns the agents run in a network namespace of their own (as on another machine), and the
-link between goes down and up again; that needs root and iproute2.
+link between is slow, loses packets, and goes down and up again; that needs no root but unshare,
+iproute2 and, for loss, nftables.
 """
 import contextlib
 import json
@@ -22,6 +23,7 @@ import xmlrpc.client
 
 # catkin's relay runs this file from another folder
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import pmeta_network
 from pmeta_files import PlotError as ChaosError
 from pmeta_program import Parser, run_program
 
@@ -30,15 +32,13 @@ LOCAL = TOP / "devel/lib/pmeta_core/pmeta_local"
 
 # short runs, of which rounds are long enough to be hit
 EXPERIMENTS = {
-    "gridworld": [],
+    "gridworld": ["environment.sizes:=[3,4,5,6,7,8,9,10]"],
     "cart_pole": ["preset:=quick", "updates_per_round:=20", "dqn.hidden:=[32,32]",
                   "dqn.buffer_size:=20000"],
 }
 PACE = 0.3
 ROUNDS_PER_KILL = 4
 LIMIT = 1200  # seconds for a disturbed run
-NAMESPACES = ("pmeta_a", "pmeta_b")
-ADDRESSES = ("10.77.0.1", "10.77.0.2")
 
 
 def call(*command, **kwargs):
@@ -150,7 +150,8 @@ class Run:
         self.work = work / experiment
         self.work.mkdir()
         self.random = random.Random("%d %s" % (options.seed, experiment))
-        self.rounds = max(20, ROUNDS_PER_KILL * options.kills)
+        self.rounds = options.rounds or max(20, ROUNDS_PER_KILL * options.kills)
+        self.tasks = 0
         self.settings = EXPERIMENTS[experiment] + [
             "seed:=%d" % options.seed, "rounds:=%d" % self.rounds, "checkpoint.interval:=1",
             "run_id:=chaos"]
@@ -163,7 +164,9 @@ class Run:
     def reference(self):
         call(LOCAL, "run", TOP / "config" / (self.experiment + ".yaml"), *self.settings,
              "results_dir:=%s" % (self.work / "undisturbed"))
-        return rows_of(self.work / "undisturbed" / self.experiment / "chaos")
+        folder = self.work / "undisturbed" / self.experiment / "chaos"
+        self.tasks = len(json.loads((folder / "manifest.json").read_text())["tasks"])
+        return rows_of(folder)
 
     def launch_arguments(self):
         return self.settings + ["pace:=%g" % PACE, "results_dir:=%s" % (self.work / "disturbed"),
@@ -193,7 +196,7 @@ class Run:
 
     def kill_nodes(self, launch, nodes):
         """Kills one of the nodes at a time, again and again; it comes back by itself."""
-        agents = ["/pmeta/task_agent_%d" % task for task in range(5)]
+        agents = ["/pmeta/task_agent_%d" % task for task in range(self.tasks)]
         self.wait(3, launch)
         while sum(self.kills.values()) < self.options.kills and launch.running():
             name = self.random.choice(agents + ["/pmeta/meta_aggregator"] * 2)
@@ -231,30 +234,38 @@ class Run:
         match = re.search(r"^\{.*\}$", relay_log.read_text(), re.M)
         return json.loads(match.group()) if match else {}
 
+    def agents_launch(self):
+        """One launch file for all agents, as they are launched on a machine of their own."""
+        agents = ["""  <include file="$(find pmeta_nodes)/launch/agent.launch">
+    <arg name="task" value="%d"/>
+    <arg name="check" value="%s"/>
+  </include>
+""" % (task, "true" if task == 0 else "false") for task in range(self.tasks)]
+        file = self.work / "agents.launch"
+        file.write_text("<launch>\n%s</launch>\n" % "".join(agents))
+        return file
+
     def over_link(self):
-        """Aggregator here, agents beyond a link that goes down and up."""
-        port = 11311
-        with network() as set_link:
-            here = self.environment(ADDRESSES[0], port)
-            there = dict(here, ROS_IP=ADDRESSES[1])
+        """Aggregator here, agents beyond a link that is slow, loses packets, and goes down and up."""
+        port = free_port()
+        options = self.options
+        with pmeta_network.Network(options.latency, options.loss) as network:
+            here = self.environment(pmeta_network.HERE, port)
+            there = dict(here, ROS_IP=pmeta_network.THERE)
             launches = [Launch(["roslaunch", "-p", port, "pmeta_nodes",
                                 self.experiment + ".launch", "agents:=false"] +
-                               self.launch_arguments(), self.work / "launch.log", here,
-                               ("ip", "netns", "exec", NAMESPACES[0]))]
+                               self.launch_arguments(), self.work / "launch.log", here)]
             try:
-                self.wait(4, launches[0])
-                launches += [Launch(["roslaunch", "--wait", "pmeta_nodes", "agent.launch",
-                                     "task:=%d" % task], self.work / ("agent_%d.log" % task),
-                                    there, ("ip", "netns", "exec", NAMESPACES[1]))
-                             for task in range(5)]
+                launches += [Launch(["roslaunch", "--wait", self.agents_launch()],
+                                    self.work / "agents.log", there, network.there)]
                 while not rows_of(self.folder) and launches[0].running():
                     self.wait(0.5, launches[0])
-                for _ in range(self.options.downs):
+                for _ in range(options.downs):
                     self.wait(self.random.uniform(1, 3), launches[0])
-                    set_link("down")
+                    network.set_link("down")
                     self.downs += 1
-                    self.wait(self.random.uniform(1, 4), launches[0])
-                    set_link("up")
+                    self.wait(options.down_seconds or self.random.uniform(1, 4), launches[0])
+                    network.set_link("up")
                 while launches[0].running():
                     self.wait(1, launches[0])
             finally:
@@ -289,32 +300,6 @@ class Run:
         }
 
 
-@contextlib.contextmanager
-def network():
-    """Two namespaces with a link between; gives a function that takes it "down" and "up"."""
-    if os.geteuid() != 0 or shutil.which("ip") is None:
-        raise ChaosError("--netns needs root and the program ip (Debian: iproute2).")
-    a, b = NAMESPACES
-
-    def remove():
-        for name in NAMESPACES:
-            subprocess.run(["ip", "netns", "del", name], stderr=subprocess.DEVNULL)
-
-    remove()
-    try:
-        for name in NAMESPACES:
-            call("ip", "netns", "add", name)
-        call("ip", "link", "add", "pmeta_va", "netns", a, "type", "veth", "peer", "name",
-             "pmeta_vb", "netns", b)
-        for name, link, address in zip(NAMESPACES, ("pmeta_va", "pmeta_vb"), ADDRESSES):
-            call("ip", "-n", name, "addr", "add", address + "/24", "dev", link)
-            call("ip", "-n", name, "link", "set", "lo", "up")
-            call("ip", "-n", name, "link", "set", link, "up")
-        yield lambda state: call("ip", "-n", b, "link", "set", "pmeta_vb", state)
-    finally:
-        remove()
-
-
 def print_table(reports):
     columns = [key for key in reports[0] if key != "good"]
     lines = [columns] + [[str(report[key]) for key in columns] for report in reports]
@@ -336,19 +321,27 @@ def chaos(arguments):
     parser.add_argument("--netns", action="store_true",
                         help="instead of kills: the agents beyond a link that goes down and up")
     parser.add_argument("--downs", type=int, default=4, help="with --netns: how often (4)")
+    parser.add_argument("--down-seconds", type=float, default=0,
+                        help="with --netns: for how long; by default 1 to 4 s each")
+    parser.add_argument("--latency", type=float, default=0.05,
+                        help="with --netns: seconds that a packet takes either way (0.05)")
+    parser.add_argument("--loss", type=int, default=5, help="with --netns: percent of packets lost (5)")
+    parser.add_argument("--rounds", type=int, default=0,
+                        help="of the run; by default %d a kill, at least 20" % ROUNDS_PER_KILL)
     parser.add_argument("--keep", metavar="DIR", help="keep logs and results in DIR")
     options = parser.parse_args(arguments)
     for name in options.experiments:
         if name not in EXPERIMENTS:
             raise ChaosError("unknown experiment '%s': chaos knows %s." % (name,
                                                                           ", ".join(EXPERIMENTS)))
+    if options.netns:
+        options.kills = 0
+        pmeta_network.enter()
     work = pathlib.Path(options.keep) if options.keep else pathlib.Path(tempfile.mkdtemp())
     if options.keep and work.exists():
         raise ChaosError("%s exists already: choose another folder." % work)
     work.mkdir(parents=True, exist_ok=True)
     call(LOCAL, "key", work / "key")
-    if options.netns:
-        options.kills = 0
     reports = [Run(name, options, work).report() for name in options.experiments or EXPERIMENTS]
     print_table(reports)
     if not all(report["good"] for report in reports):

@@ -58,6 +58,17 @@ TEST(RoundNews, SaysWhenARoundGoesOnWithoutTheMissing) {
       << run.outlet.told.back().message;
 }
 
+TEST(RoundNews, NamesTheMachineOfWhoIsMissing) {
+  GridRun run({"round_timeout:=30", "machines.robot.host:=10.0.0.2", "machines.robot.tasks:=[1]",
+               "machines.robot.env_loader:=/env.sh"});
+  run.begin(0);
+  run.report(0, 1);
+  run.step(31);
+  EXPECT_EQ(run.outlet.told[0].message,
+            "round 1 has waited 31 s for task 1 (grid_3x3) on robot, task 2 (grid_4x4); round 1 "
+            "waits until all 3 tasks have reported");
+}
+
 TEST(RoundNews, NamesWhoFallsSilentAndWhoIsBack) {
   GridRun run({}, {0, 0, 1.5, 15});
   run.begin(0);

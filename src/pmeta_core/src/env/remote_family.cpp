@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "pmeta_core/base/format.h"
+#include "pmeta_core/base/named_groups.h"
 #include "pmeta_core/env/task_split.h"
 
 namespace pmeta {
@@ -17,27 +18,10 @@ const RegisteredFamily<RemoteFamily> kFamily(kRemoteName);
 const std::string kObservations = "environment.observations";
 const std::string kActions = "environment.actions";
 
-// of a name of ROS or of YAML
-bool isWord(const std::string& text, const std::string& besides) {
-  return !text.empty() && std::all_of(text.begin(), text.end(), [&](unsigned char c) {
-    return std::isalnum(c) != 0 || besides.find(static_cast<char>(c)) != std::string::npos;
-  });
-}
-
-// the names that stand below `key`, in their order
-std::vector<std::string> namesBelow(const std::string& key, const ListedSettings& given) {
-  std::vector<std::string> names;
-  for (const auto& [full, value] : given) {
-    if (full.rfind(key + ".", 0) != 0) continue;
-    const std::string rest = full.substr(key.size() + 1);
-    const std::string name = rest.substr(0, rest.find('.'));
-    if (!isWord(name, "_")) {
-      throw Error(key + " has the name " + shown(name) +
-                  " but must have one of letters, digits and _.");
-    }
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  }
-  return names;
+bool isNameOfRos(const std::string& text) {
+  return text.front() == '/' && text.back() != '/' &&
+         std::all_of(text.begin(), text.end(),
+                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '/'; });
 }
 
 template <class Entries>
@@ -128,7 +112,7 @@ void RemoteFamily::build(std::uint64_t) {
   std::set<std::string> names;
   for (int task = 0; task < numTasks() + numTestTasks(); ++task) {
     const std::string& server = serverOf(task);
-    if (server.front() != '/' || !isWord(server, "_/") || server.back() == '/') {
+    if (!isNameOfRos(server)) {
       throw Error("environment.servers holds " + shown(server) +
                   " but must hold full names of ROS, e.g. /robot_0.");
     }

@@ -130,6 +130,7 @@ void Experiment::bind(Settings& s) {
     bindExclusion(s, e.aggregation);
   }
   s.bind("environment.name", e.environment, "family of environments", envFamilies().names());
+  bindMachines(s, e.machines);
   if (!family_->package().name.empty()) {
     s.bind("environment.package_version", e.package_version,
            "of the package that the environment is of; \"\" means the one that is here");

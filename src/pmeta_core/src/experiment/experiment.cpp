@@ -28,6 +28,8 @@ std::map<std::string, std::string> Experiment::definingSettings(const std::strin
         "threads"}) {
     settings.erase(key);
   }
+  // where agents run, in one group
+  settings.erase(settings.lower_bound("machines."), settings.lower_bound("machines/"));
   return settings;
 }
 
@@ -69,6 +71,7 @@ std::string Experiment::describe() const {
   defaults.family_ = makeFamily(settings_.environment);
   const YAML::Node effective = parseYaml(yaml_, "the settings");
   defaults.family_->outline(listedSettings(effective));
+  defaults.settings_.machines = outlineMachines(listedSettings(effective));
   Settings settings;
   defaults.chooseKinds(settings_.algorithm, settings_.learner);
   defaults.bind(settings);

@@ -39,21 +39,21 @@ std::string peek(const std::vector<YAML::Node>& files, const std::vector<std::st
   return fallback;
 }
 
-// what files and overrides say of the environment, in their order
-ListedSettings environmentSettings(const std::vector<YAML::Node>& files,
-                                   const std::vector<std::string>& overrides) {
-  static const std::string kGroup = "environment.";
+// what files and overrides say of a group in which the user gives names, in their order
+ListedSettings settingsOf(const std::string& group, const std::vector<YAML::Node>& files,
+                          const std::vector<std::string>& overrides) {
   ListedSettings given;
   for (const YAML::Node& file : files) {
-    const YAML::Node environment = file["environment"];
-    if (!environment || !environment.IsMap()) continue;
-    for (const auto& [key, value] : listedSettings(environment)) {
-      given.emplace_back(kGroup + key, value);
+    if (!file.IsMap() || !file[group]) continue;
+    if (!file[group].IsMap() || file[group].size() == 0) given.emplace_back(group, "");
+    if (!file[group].IsMap()) continue;
+    for (const auto& [key, value] : listedSettings(file[group])) {
+      given.emplace_back(group + "." + key, value);
     }
   }
   for (const std::string& assignment : overrides) {
     const auto split = assignment.find(":=");
-    if (split == std::string::npos || assignment.rfind(kGroup, 0) != 0) continue;
+    if (split == std::string::npos || assignment.rfind(group + ".", 0) != 0) continue;
     given.emplace_back(assignment.substr(0, split), assignment.substr(split + 2));
   }
   return given;
@@ -115,7 +115,9 @@ void requireAlgorithms(const YAML::Node& of_algorithms) {
 // a meta-learner has none of the agents' settings: what a file says of them is for the others
 void removeAgentSettings(YAML::Node layer) {
   if (!layer.IsMap()) return;
-  for (const char* name : {"learner", "personal", "fresh_episodes"}) layer.remove(name);
+  for (const char* name : {"learner", "personal", "fresh_episodes", "machines"}) {
+    layer.remove(name);
+  }
   for (const std::string& learner : learners().names()) layer.remove(learner);
   YAML::Node aggregation = layer["aggregation"];
   if (!aggregation.IsMap()) return;
@@ -208,10 +210,11 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
                          peek(files, overrides, "", "learner", experiment.settings_.learner));
   experiment.family_ =
       makeFamily(peek(files, overrides, "environment", "name", experiment.settings_.environment));
-
-  experiment.family_->outline(environmentSettings(files, overrides));
+  experiment.family_->outline(settingsOf("environment", files, overrides));
   if (experiment.hasMetaLearner()) {
     for (const YAML::Node& file : files) removeAgentSettings(file);
+  } else {
+    experiment.settings_.machines = outlineMachines(settingsOf("machines", files, overrides));
   }
 
   Settings settings;
@@ -238,6 +241,7 @@ Experiment Experiment::build(const YAML::Node& root, const std::string& source,
   experiment.checkBodies();
   experiment.checkLearning();
   experiment.checkPackage();
+  checkMachines(e.machines, experiment.totalTasks());
   e.results_dir = expandResultsDir(e.results_dir);
   if (!e.key_file.empty()) e.key_file = absolutePath("key_file", e.key_file);
   if (!e.library.empty()) e.library = absolutePath("library", e.library);

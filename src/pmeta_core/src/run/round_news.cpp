@@ -115,8 +115,9 @@ std::string RoundDriver::waitText(Time now) const {
 std::string RoundDriver::namesOf(const std::vector<int>& tasks) const {
   std::vector<std::string> names;
   for (const int task : tasks) {
+    const Machine* machine = machineOf(experiment_.settings().machines, task);
     names.push_back("task " + std::to_string(task) + " (" + experiment_.family().taskName(task) +
-                    ")");
+                    ")" + (machine == nullptr ? "" : " on " + machine->name));
   }
   return join(names);
 }

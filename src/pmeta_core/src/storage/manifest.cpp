@@ -10,11 +10,11 @@
 
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/file.h"
-#include "pmeta_core/base/format.h"
 #include "pmeta_core/base/version.h"
 #include "pmeta_core/experiment/algorithm.h"
 #include "pmeta_core/messages/protocol.h"
 #include "pmeta_core/nn/machine.h"
+#include "pmeta_core/storage/origin.h"
 #include "pmeta_core/storage/run_lock.h"
 
 namespace pmeta {
@@ -144,20 +144,16 @@ std::int64_t manifestCount(const std::string& run_dir, const char* key) {
 }
 
 std::string otherMachine(const Experiment& experiment) {
-  // tables have no matrix products; portable ones are the same everywhere
-  if (!experiment.hasNetworks()) return "";
-  const bool portable = experiment.settings().arithmetic == "portable";
   const Json before = entryOf(experiment.runDir(), "machine");
-  if (before.is_null()) return "";
-  const std::map<std::string, std::string> now = machine();
-  for (const char* part : {"products", "processor", "glibc"}) {
-    if (portable && part != std::string("glibc")) continue;
-    if (!before.is_object() || !before.contains(part) || before[part] == now.at(part)) continue;
-    return "the run was begun on another machine (" + std::string(part) + " " +
-           shown(before[part].is_string() ? before[part].get<std::string>() : "") + ", here " +
-           shown(now.at(part)) + "): its numbers may differ from those of a run that stays on one.";
+  if (!before.is_object()) return "";
+  std::map<std::string, std::string> parts;
+  for (const auto& [part, value] : before.items()) {
+    parts[part] = value.is_string() ? value.get<std::string>() : "";
   }
-  return "";
+  const std::string part = differingPart(experiment, parts);
+  if (part.empty()) return "";
+  return "the run was begun on another machine (" + part +
+         "): its numbers may differ from those of a run that stays on one.";
 }
 
 }  // namespace pmeta

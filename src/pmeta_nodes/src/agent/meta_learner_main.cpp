@@ -14,6 +14,8 @@ constexpr char kHelp[] =
 private parameters
   ~resume       begin with the newest checkpoint of the run folder (default false)
   ~config_file  settings file; by default the parameter `config` of the namespace is read
+  ~results_dir  where this machine keeps what the node saves; by default that of the settings
+  ~key_file     where this machine has the key; by default that of the settings
 subscribes   meta_policy, round
 publishes    auxiliary, returns, agent_status, task_<i>/trajectory for each task, /diagnostics
 For algorithms that pool the trajectories of all tasks, such as maml_trpo and promp. Normally started

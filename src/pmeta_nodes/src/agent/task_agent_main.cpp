@@ -16,6 +16,8 @@ private parameters
                 and only evaluate the meta-policy
   ~resume       begin with the newest checkpoint of the run folder (default false)
   ~config_file  settings file; by default the parameter `config` of the namespace is read
+  ~results_dir  where this machine keeps what the node saves; by default that of the settings
+  ~key_file     where this machine has the key; by default that of the settings
 subscribes   meta_policy, round
 publishes    auxiliary, returns, agent_status, task_<i>/trajectory, /diagnostics
 Normally started by roslaunch pmeta_nodes gridworld.launch, one process for each task.

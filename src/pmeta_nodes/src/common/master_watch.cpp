@@ -13,14 +13,18 @@ constexpr std::chrono::seconds kEvery{2};
 
 enum class Master { kKnowsUs, kHasForgottenUs, kGone };
 
-Master askMaster() {
+bool knowsUs() {
   XmlRpc::XmlRpcValue request, response, payload;
   request[0] = ros::this_node::getName();
   request[1] = ros::this_node::getName();
-  if (ros::master::execute("lookupNode", request, response, payload, false)) {
-    return Master::kKnowsUs;
-  }
-  return ros::master::check() ? Master::kHasForgottenUs : Master::kGone;
+  return ros::master::execute("lookupNode", request, response, payload, false);
+}
+
+Master askMaster() {
+  if (knowsUs()) return Master::kKnowsUs;
+  if (!ros::master::check()) return Master::kGone;
+  // the network may just have come back
+  return knowsUs() ? Master::kKnowsUs : Master::kHasForgottenUs;
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace pmeta_nodes {
 class MasterWatch {
  public:
   /// `patience`: how long the master may be out of reach.
-  explicit MasterWatch(std::chrono::duration<double> patience = std::chrono::seconds(10));
+  explicit MasterWatch(std::chrono::duration<double> patience);
   ~MasterWatch();
 
   /// Why the node should stop, in a sentence; "" while all is well.

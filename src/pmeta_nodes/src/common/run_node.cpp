@@ -11,6 +11,7 @@
 #include "common/free_memory.h"
 #include "common/master_watch.h"
 #include "common/private_param.h"
+#include "launch/addresses.h"
 #include "pmeta_core/base/error.h"
 #include "pmeta_core/base/process.h"
 #include "pmeta_core/nn/held_signals.h"
@@ -20,6 +21,9 @@ namespace {
 
 std::unique_ptr<MasterWatch> g_master;
 
+// how long the master may be out of reach; a network may be down for a while and come back
+constexpr std::chrono::seconds kMasterHere{10};
+constexpr std::chrono::seconds kMasterElsewhere{120};
 constexpr double kAskAgain = 0.2;      // seconds between two attempts at the master
 constexpr double kLookForStop = 0.05;  // seconds
 
@@ -78,7 +82,8 @@ int runNode(int argc, char** argv, const std::string& name, const std::string& h
   pmeta::heedStopSignals();
   return orSentence([&] {
     const pmeta::Experiment experiment = readExperiment(nh);
-    g_master = std::make_unique<MasterWatch>();
+    const bool here = isHere(ros::master::getHost());
+    g_master = std::make_unique<MasterWatch>(here ? kMasterHere : kMasterElsewhere);
     int code = body(experiment);
     const std::string trouble = g_master->trouble();
     if (!trouble.empty()) {
@@ -103,7 +108,13 @@ void spinUntilStopped() {
 
 pmeta::Experiment readExperiment(const ros::NodeHandle& nh) {
   const std::string file = privateText("config_file", "");
-  if (!file.empty()) return pmeta::Experiment::load(file);
+  // on a machine of its own
+  std::vector<std::string> places;
+  for (const std::string key : {"results_dir", "key_file"}) {
+    const std::string place = privateText(key, "");
+    if (!place.empty()) places.push_back(key + ":=" + place);
+  }
+  if (!file.empty()) return pmeta::Experiment::load(file, places);
   std::string text;
   const pmeta::HeldSignals held_signals;  // see privateText()
   if (!nh.getParam("config", text)) {
@@ -111,7 +122,7 @@ pmeta::Experiment readExperiment(const ros::NodeHandle& nh) {
                        " is not set: start with roslaunch pmeta_nodes gridworld.launch, or give "
                        "_config_file:=FILE.");
   }
-  return pmeta::Experiment::parse(text, "the parameter " + nh.resolveName("config"));
+  return pmeta::Experiment::parse(text, "the parameter " + nh.resolveName("config"), places);
 }
 
 }  // namespace pmeta_nodes

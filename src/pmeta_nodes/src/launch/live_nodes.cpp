@@ -1,10 +1,10 @@
 #include "launch/live_nodes.h"
 
 #include <ros/network.h>
-#include <unistd.h>
 
 #include <cstdlib>
 
+#include "launch/addresses.h"
 #include "launch/launch_parent.h"
 #include "launch/xml_rpc.h"
 #include "pmeta_core/base/settings.h"
@@ -27,17 +27,6 @@ std::string portOption(const std::vector<std::string>& words) {
     if (words[i].rfind("-p", 0) == 0 && words[i].size() > 2) return words[i].substr(2);
   }
   return "";
-}
-
-bool isHere(const std::string& host) {
-  char own[256] = "";
-  gethostname(own, sizeof own - 1);
-  if (host == "localhost" || host.rfind("127.", 0) == 0 || host == own) return true;
-  for (const char* variable : {"ROS_IP", "ROS_HOSTNAME"}) {
-    const char* value = std::getenv(variable);
-    if (value != nullptr && host == value) return true;
-  }
-  return false;
 }
 
 }  // namespace

@@ -2,17 +2,18 @@
 // starts, writes the launch file that holds one agent for each task, and prints the effective
 // settings, which become the parameter that all nodes read.
 #include <ros/names.h>
+#include <ros/network.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <regex>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include "launch/addresses.h"
+#include "launch/agents_launch.h"
 #include "launch/launch_parent.h"
 #include "launch/launch_words.h"
 #include "launch/live_nodes.h"
@@ -29,6 +30,8 @@ namespace {
 
 using pmeta::Error;
 using pmeta::Experiment;
+using pmeta_nodes::Launch;
+using pmeta_nodes::PartyNode;
 
 constexpr char kHelp[] =
     R"(prepare_run: checks a run's settings, writes the launch file of its agents, prints the settings.
@@ -39,7 +42,8 @@ constexpr char kHelp[] =
 CONFIG         settings file; with resume:=RUN_DIR the run there goes on, with its own settings
 AGENTS_LAUNCH  launch file to write: a task_agent for each training and test task, or the
                meta_learner of algorithms that have one (unless agents:=false),
-               with record:=true rosbag, and the settings as the parameters below `settings`
+               with record:=true rosbag, the machines that the settings name, and the settings as the
+               parameters below `settings`
 LAUNCH_FILE    launch file of pMeta's: checks what it is to be called with, and prints the run's folder and
                how many agents it has
 key:=value     settings that override the file's; an empty value leaves the file's. The value of
@@ -77,7 +81,7 @@ std::string takeAssignment(std::vector<std::string>& assignments, const std::str
       assignments.begin(), assignments.end(),
       [&](const std::string& assignment) { return assignment.rfind(key + ":=", 0) == 0; });
   if (found == assignments.end()) return "";
-  const std::string value = found->substr(key.size() + 2);
+  std::string value = found->substr(key.size() + 2);
   assignments.erase(found);
   return value;
 }
@@ -94,14 +98,6 @@ bool takeFlag(std::vector<std::string>& assignments, const std::string& key, boo
   }
   throw Error(key + " is " + pmeta::shown(value) + " but must be true or false.");
 }
-
-/// What a launch starts besides the settings.
-struct Launch {
-  std::string ns;  ///< of the run, e.g. "/pmeta"
-  bool agents = true;
-  bool view = false;
-  bool record = false;
-};
 
 Launch takeLaunch(std::vector<std::string>& assignments) {
   const std::string name = takeAssignment(assignments, "ns");
@@ -122,28 +118,13 @@ Launch takeLaunch(std::vector<std::string>& assignments) {
   return launch;
 }
 
-/// A node that trains.
-struct PartyNode {
-  std::string name, type;
-  int task = -1;  ///< that it is to be told; -1: none
-};
-
-std::vector<PartyNode> partyNodes(const Experiment& experiment) {
-  if (experiment.hasMetaLearner()) return {{"meta_learner", "meta_learner"}};
-  std::vector<PartyNode> nodes;
-  for (int task = 0; task < experiment.totalTasks(); ++task) {
-    nodes.push_back({"task_agent_" + std::to_string(task), "task_agent", task});
-  }
-  return nodes;
-}
-
 // a master ends the node that has a name when another one takes it
 void requireFreeNames(const Experiment& experiment, const Launch& launch) {
   std::vector<std::string> names = {"run_guard", "meta_aggregator"};
   if (launch.view) names.push_back("trajectory_view");
   if (launch.record) names.push_back("recorder");
   if (launch.agents) {
-    for (const PartyNode& node : partyNodes(experiment)) names.push_back(node.name);
+    for (const PartyNode& node : pmeta_nodes::partyNodes(experiment)) names.push_back(node.name);
   }
   for (std::string& name : names) name = launch.ns + "/" + name;
   const std::string master = pmeta_nodes::launchMaster();
@@ -158,60 +139,34 @@ void requireFreeNames(const Experiment& experiment, const Launch& launch) {
       "(ROS_MASTER_URI=http://localhost:PORT).");
 }
 
-std::string escapeXml(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
+// what to do where nodes here give out an address that no other machine reaches; "" where they do
+// not
+std::string loopbackAdvice() {
+  const std::string given = pmeta_nodes::givenOutAddress();
+  if (!pmeta_nodes::isLoopback(given)) return "";
+  std::string master;
+  std::uint32_t port = 0;
+  ros::network::splitURI(pmeta_nodes::launchMaster(), master, port);
+  const std::vector<std::string> own = pmeta_nodes::ownAddresses();
+  const std::string advice =
+      "nodes here give out " + given + ", where no other machine reaches them: ";
+  if (own.empty())
+    return advice + "connect this machine to a network, then set ROS_IP to its address.";
+  const std::string others = pmeta::join({own.begin() + 1, own.end()}, " or ");
+  return advice + "type 'export ROS_IP=" + own.front() + "' and launch again" +
+         (others.empty() ? "" : " (this machine is also " + others + ")") +
+         "; agent.launch on another machine takes 'export ROS_MASTER_URI=http://" + own.front() +
+         ":" + std::to_string(port) + "'.";
+}
+
+void requireReachable(const Experiment& experiment, const Launch& launch) {
+  if (!launch.agents) return;
+  for (const pmeta::Machine& machine : experiment.settings().machines) {
+    const std::string advice = pmeta_nodes::isHere(machine.host) ? "" : loopbackAdvice();
+    if (!advice.empty()) {
+      throw Error("machines." + machine.name + " is another machine, but " + advice);
     }
   }
-  return out;
-}
-
-// as one word of a node's args, which roslaunch splits like a shell
-std::string quoted(std::string text) {
-  for (std::size_t at = 0; (at = text.find('\'', at)) != std::string::npos; at += 4) {
-    text.replace(at, 1, "'\\''");
-  }
-  return "'" + text + "'";
-}
-
-// parameters hold no whole numbers of more than 32 bits: such a seed is given as text
-std::string parameterYaml(const Experiment& experiment) {
-  return std::regex_replace(experiment.yaml(), std::regex("(: )([0-9]{10,})(\n)"), "$1\"$2\"$3");
-}
-
-std::string agentsLaunch(const Experiment& experiment, const Launch& launch) {
-  std::ostringstream xml;
-  xml << "<launch>\n"
-      << "  <rosparam ns=\"settings\" subst_value=\"false\">\n"
-      << escapeXml(parameterYaml(experiment)) << "  </rosparam>\n";
-  for (const PartyNode& node : partyNodes(experiment)) {
-    if (!launch.agents) break;
-    xml << "  <node name=\"" << node.name << "\" pkg=\"pmeta_nodes\" type=\"" << node.type
-        << "\" respawn=\"true\" respawn_delay=\"1\">\n";
-    if (node.task >= 0) xml << "    <param name=\"task\" value=\"" << node.task << "\"/>\n";
-    xml << "    <param name=\"resume\" value=\"true\"/>\n"
-        << "  </node>\n";
-  }
-  if (launch.record) {
-    const std::string bag = experiment.runDir() + ".bag";
-    xml << "  <node name=\"recorder\" pkg=\"rosbag\" type=\"record\" args=\"-O "
-        << escapeXml(quoted(bag)) << " -e '" << launch.ns << "/.*' -x " << launch.ns
-        << "/playback\"/>\n";
-  }
-  xml << "</launch>\n";
-  return xml.str();
 }
 
 // launch files of launches that ended before their nodes were started; others are deleted by
@@ -264,9 +219,10 @@ int check(const std::vector<std::string>& words) {
   std::vector<std::string> assignments = readAssignments(pmeta_nodes::handedOn(
       {words.begin() + 2, words.end()},
       pmeta_nodes::readLaunchFile(words[0], std::filesystem::path(words[0]).parent_path())));
-  takeLaunch(assignments);
+  const Launch launch = takeLaunch(assignments);
   const Experiment experiment = checkedExperiment(words[1], assignments);
-  std::cout << experiment.runDir() << "\n" << partyNodes(experiment).size() << "\n";
+  requireReachable(experiment, launch);
+  std::cout << experiment.runDir() << "\n" << pmeta_nodes::partyNodes(experiment).size() << "\n";
   return 0;
 }
 
@@ -279,14 +235,18 @@ int prepare(std::vector<std::string> words) {
   std::vector<std::string> assignments = readAssignments(words);
   const Launch launch = takeLaunch(assignments);
   const Experiment experiment = checkedExperiment(config, assignments);
+  requireReachable(experiment, launch);
   requireFreeNames(experiment, launch);
+  const std::string advice = launch.agents ? "" : loopbackAdvice();
+  if (!advice.empty()) std::cerr << "pmeta: warning: agents:=false, but " << advice << "\n";
   for (const std::string& note : experiment.notes()) std::cerr << "pmeta: " << note << "\n";
   std::cerr << "settings\n" << experiment.table();
 
   std::error_code error;
   std::filesystem::create_directories(launch_file.parent_path(), error);
   removeOldLaunchFiles(launch_file);
-  pmeta::writeFileAtomically(launch_file.string(), agentsLaunch(experiment, launch));
+  pmeta::writeFileAtomically(launch_file.string(),
+                             pmeta_nodes::agentsLaunch(experiment, launch, launch_file));
   std::cout << experiment.yaml();
   return 0;
 }

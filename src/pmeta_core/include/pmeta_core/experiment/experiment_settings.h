@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
+#include "pmeta_core/experiment/machines.h"
 #include "pmeta_core/personal/personal_settings.h"
 
 namespace pmeta {
@@ -52,6 +54,7 @@ struct ExperimentSettings {
   PersonalSettings personal;    ///< step sizes and pull
   AggregationSettings aggregation;        ///< mixing and waiting
   std::string environment = "gridworld";  ///< a name of envFamilies()
+  std::vector<Machine> machines;          ///< over ROS: where agents run that do not run here
   std::string package_version;  ///< of the environment's package, when the run began; "" as it is
 };
 
