@@ -18,7 +18,9 @@ struct Known {
     parameters.resize(model->size());
     std::copy(rewards.begin(), rewards.end(), parameters.begin() + 3);
   }
-  TaskPosterior posterior() const { return TaskPosterior(*model, settings, parameters.data()); }
+  // looks into what it is of
+  TaskPosterior posterior() const& { return TaskPosterior(*model, settings, parameters.data()); }
+  TaskPosterior posterior() const&& = delete;
 
   TaskModelSettings settings;
   std::optional<TaskModel> model;
@@ -31,7 +33,8 @@ void observe(TaskPosterior& posterior, float reward, float state = 0.5f) {
 }
 
 TEST(TaskPosterior, KnowsNothingBeforeAnyTransition) {
-  const TaskPosterior posterior = Known({1, 2, 3, 4}).posterior();
+  const Known known({1, 2, 3, 4});
+  const TaskPosterior posterior = known.posterior();
   EXPECT_EQ(posterior.weights(), std::vector<double>(4, 0.25));
   EXPECT_EQ(posterior.best(), std::vector<float>(4, 0.25f));
 }
@@ -120,7 +123,8 @@ TEST(TaskPosterior, MixturesLieBetweenTwoTasks) {
   observe(posterior, 6);
   EXPECT_EQ(posterior.best(), (std::vector<float>{0, 0.25f, 0.75f}));
   settings.hypotheses = "vertices";
-  TaskPosterior of_vertices = Known({-2, 0, 8}, settings).posterior();
+  const Known far({-2, 0, 8}, settings);
+  TaskPosterior of_vertices = far.posterior();
   EXPECT_EQ(of_vertices.energies().size(), 3u);
 }
 

@@ -275,7 +275,8 @@ TEST_F(PolicyFileTest, ARunLeavesItsPoliciesInItsFolder) {
 }
 
 TEST_F(PolicyFileTest, SaysWhatItsNumbersAreAndHowLongAStepTakes) {
-  const auto grid = policyMetadata(gridExperiment({"sizes:=[4, 5]"}), {PolicyKind::kPersonal, 1, 3});
+  const auto grid =
+      policyMetadata(gridExperiment({"sizes:=[4, 5]"}), {PolicyKind::kPersonal, 1, 3});
   const Json rows = {{"name", "row"}, {"unit", "cells"}, {"low", 0}, {"high", 4}};
   EXPECT_EQ(Json::parse(grid.at("observation")).at(0), rows);
   EXPECT_EQ(Json::parse(grid.at("action")).at(0).at("high"), 3);

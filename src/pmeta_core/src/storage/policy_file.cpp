@@ -331,13 +331,10 @@ std::map<std::string, std::string> policyMetadata(const Experiment& experiment,
   return metadata;
 }
 
-std::string policiesFolder(Kept kept) {
-  return kept == Kept::kLast ? "policies" : "policies/best";
-}
+std::string policiesFolder(Kept kept) { return kept == Kept::kLast ? "policies" : "policies/best"; }
 
 std::string policyPath(const std::string& run_dir, Kept kept, PolicyKind policy, int task) {
-  const std::string whose =
-      policy == PolicyKind::kMeta ? "meta" : "task_" + std::to_string(task);
+  const std::string whose = policy == PolicyKind::kMeta ? "meta" : "task_" + std::to_string(task);
   return run_dir + "/" + policiesFolder(kept) + "/" + whose + ".safetensors";
 }
 
