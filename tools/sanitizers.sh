@@ -26,7 +26,8 @@ sanitize() {
   mkdir -p "$TOP/$BUILD/reports"
   # nodes that roslaunch stops tell nobody their exit code: a report is a file
   local options=log_path=$TOP/$BUILD/reports/report
-  export ASAN_OPTIONS=$options UBSAN_OPTIONS=$options:print_stacktrace=1
+  # what does not fit into memory is refused, which tests rely on
+  export ASAN_OPTIONS=$options:allocator_may_return_null=1 UBSAN_OPTIONS=$options:print_stacktrace=1
   # roscpp is not instrumented: what it does among its own threads looks like races
   export TSAN_OPTIONS=$options:ignore_noninstrumented_modules=1
   TSAN_OPTIONS+=:suppressions=$TOP/test/tsan.supp:print_suppressions=0
