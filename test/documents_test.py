@@ -243,13 +243,14 @@ def test_pages_have_commands_and_links_that_lead_somewhere():
 
 def test_pages_name_settings_that_exist():
     """Inline `key:=value` words are settings or launch arguments."""
-    launch = (TOP / "launch/experiment.launch").read_text()
-    known = set(re.findall(r'<arg name="(\w+)"', launch)) | {"bag", "task", "config", "run"}
+    launch = "".join(path.read_text() for path in (TOP / "launch").glob("*.launch"))
+    known = set(re.findall(r'<arg name="(\w+)"', launch))
     for config in (TOP / "config").glob("*.yaml"):
         if config.name == "convergence.yaml":
             continue
-        text = run([LOCAL, "check", config]).stdout
-        known |= set(re.findall(r"^ *(\w+):", text, re.M))
+        text = run([LOCAL, "check", config, "machines.one.host:=there", "machines.one.tasks:=[0]",
+                    "machines.one.env_loader:=/env.sh"]).stdout
+        known |= set(re.findall(r"^ *(?:\w+\.)?(\w+):", text, re.M))
     for page in PAGES:
         prose = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.M | re.S)
         for key in re.findall(r"`(?:[^`\n]* )?([a-zA-Z_.]+):=", prose):

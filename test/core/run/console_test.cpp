@@ -200,7 +200,7 @@ TEST(ListRunFolder, NamesWhatIsThere) {
   EXPECT_EQ(lines[1].rfind("  config.yaml     ", 0), 0u) << lines[1];
   EXPECT_EQ(lines[2].rfind("  losses.csv      ", 0), 0u) << lines[2];
   EXPECT_EQ(lines[3].rfind("  manifest.json   ", 0), 0u) << lines[3];
-  EXPECT_EQ(lines[4], "  policies/       6 files");
+  EXPECT_EQ(lines[4], "  policies/       12 files");
   EXPECT_EQ(lines[5].rfind("  rounds.csv      ", 0), 0u) << lines[5];
   EXPECT_EQ(lines[5].back(), 'B');
 }

@@ -183,7 +183,12 @@ std::string listRunFolder(const std::string& dir) {
   for (const auto& entry : fs::directory_iterator(dir, error)) {
     const std::string name = entry.path().filename().string();
     if (entry.is_directory(error)) {
-      const auto files = std::distance(fs::directory_iterator(entry.path(), error), {});
+      const fs::recursive_directory_iterator below(entry.path(), error);
+      const auto files =
+          std::count_if(begin(below), end(below), [](const fs::directory_entry& one) {
+            std::error_code gone;
+            return one.is_regular_file(gone);
+          });
       lines.push_back("  " + padded(name + "/", 16) + std::to_string(files) +
                       (files == 1 ? " file" : " files"));
     } else {
