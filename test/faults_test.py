@@ -26,13 +26,19 @@ def wait_until(condition, seconds=60):
 
 @contextlib.contextmanager
 def process(command, log, env):
-    """A program in a group of its own, its output in a file; killed at the end."""
+    """A program in a group of its own, its output in a file; ended at the end.
+
+    A launch that is only killed would leave its nodes behind.
+    """
     with open(str(log), "w") as out:
         started = subprocess.Popen([str(word) for word in command], stdout=out,
                                    stderr=subprocess.STDOUT, env=env, preexec_fn=os.setsid)
     try:
         yield started
     finally:
+        started.terminate()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            started.wait(60)
         with contextlib.suppress(ProcessLookupError):
             os.killpg(started.pid, signal.SIGKILL)
         started.wait()

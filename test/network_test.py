@@ -63,17 +63,6 @@ def firewall(machine, rule):
 
 
 @contextlib.contextmanager
-def launched(command, log, env):
-    """A launch that is ended as by Ctrl-C: killed, it would leave its nodes behind."""
-    with process(command, log, env) as roslaunch:
-        try:
-            yield
-        finally:
-            roslaunch.terminate()
-            roslaunch.wait(60)
-
-
-@contextlib.contextmanager
 def ssh_server(machine, tmp_path, env):
     """Its port there; both keys are thrown away."""
     import paramiko
@@ -173,25 +162,26 @@ def test_a_machine_that_is_off_or_has_no_ssh_is_named_within_ten_seconds(network
 def test_an_agent_that_cannot_take_part_says_why_at_once(network, tmp_path):
     here, there = network
     env = environment(tmp_path)
-    agent = there + ["roslaunch", "pmeta_nodes", "agent.launch", "task:=0"]
+    launched_there = there + ["roslaunch", "pmeta_nodes", "agent.launch", "task:=0"]
+    looked_at = there + [SCRIPTS / "check_agent.py", "--namespace", "pmeta"]
 
-    def refused(sentence, **given):
+    def refused(sentence, look=looked_at, **given):
         begin = time.monotonic()
-        done = run(agent, env=dict(on(THERE, env), **given))
+        done = run(look, env=dict(on(THERE, env), **given))
         assert done.returncode == 1 and time.monotonic() - begin < 15
         assert "pmeta: " + sentence in done.stderr, done.stderr
         assert "started with pid" not in done.stdout
 
     master = on(HERE, env)["ROS_MASTER_URI"]
     refused("there is no answer from the ROS master at %s: launch the run there after 'export ROS_IP=%s'"
-            % (master, HERE))
+            % (master, HERE), launched_there)
     refused("there is no answer from the ROS master at http://localhost:11311: that is this machine; "
             "type 'export ROS_MASTER_URI=http://ADDRESS:11311'", ROS_MASTER_URI="http://localhost:11311")
     launch = here + ["roslaunch", "-p", master.rsplit(":", 1)[1], "pmeta_nodes", "gridworld.launch",
                      "agents:=false", "results_dir:=%s" % tmp_path]
     log = tmp_path / "launch.log"
     for address in ("", HERE):
-        with launched(launch + ["run_id:=r" + address], log, on(address, env)):
+        with process(launch + ["run_id:=r" + address], log, on(address, env)):
             assert wait_until(lambda: "10" in run(
                 here + ["timeout", "5", "rostopic", "echo", "-n1", "/pmeta/round/rounds"],
                 env=on(address, env)).stdout), log.read_text()

@@ -105,7 +105,7 @@ def test_from_a_plan_to_a_page(folder, tmp_path):
 
 @pytest.mark.skipif(not os.path.isfile(str(LOCAL)), reason="needs pmeta_local")
 def test_it_stops_after_the_given_time_and_goes_on(folder, tmp_path):
-    edit(str(folder), "plan.yaml", lambda t: t.replace("rounds:=3", "rounds:=200", 1))
+    edit(str(folder), "plan.yaml", lambda t: t.replace("rounds:=3", "rounds:=40", 1))
     run = ("--results-dir", tmp_path / "runs", "--run", "--only", "first", "--jobs", "1")
     assert "stopped; the same command goes on" in results(folder, *run, "--hours", "1e-9")
     assert not (folder / "data").exists()
