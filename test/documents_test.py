@@ -5,6 +5,7 @@ import os
 import re
 import shlex
 import signal
+import socket
 import subprocess
 import time
 
@@ -133,10 +134,20 @@ class Desk:
             end(process)
         assert code == 0, "%s ended with %d:\n%s" % (command, code, log.read_text()[-4000:])
 
+    def has_master(self):
+        host, port = self.env["ROS_MASTER_URI"].split("//")[1].split(":")
+        with socket.socket() as probe:
+            return probe.connect_ex((host, int(port))) == 0
+
     def start_and_stop(self, command):
         process, log = self.start(command)
         try:
-            time.sleep(8)
+            if "rosrun" not in command:  # a launch begins with its master
+                begin = time.monotonic()
+                while not self.has_master() and process.poll() is None:
+                    assert time.monotonic() - begin < 60, log.read_text()[-4000:]
+                    time.sleep(0.2)
+            time.sleep(5)
             assert process.poll() is None, log.read_text()[-4000:]
             os.killpg(process.pid, signal.SIGINT)
             process.wait(30)
